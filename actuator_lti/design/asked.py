@@ -9,7 +9,18 @@ from typing import Annotated, Any, Literal
 import numpy as np
 
 from actuator_lti.asked.quantities import QUANTITIES
-from actuator_lti.design.field import Axis, choice, day, label, limit, positive, quantities, quantity, text
+from actuator_lti.design.field import (
+    Axis,
+    choice,
+    day,
+    label,
+    limit,
+    not_negative,
+    positive,
+    quantities,
+    quantity,
+    text,
+)
 
 # fmt: off
 Rotor = Literal["free", "locked"]
@@ -48,10 +59,11 @@ class DutyCycle:
         "default half the peak current", example="5 A")] = None
     frequency_rad_s: Annotated[float | None, positive("of the motion; default 1 Hz", unit="rad/s",
         example="0.5 Hz")] = None
-    ramp_s: Annotated[float | None, positive("rise and fall of a trapezoid, each; default a sine, of a speed "
-        "drive twice the time that its acceleration takes", high=1e6, example="0.2 s")] = None
+    ramp_s: Annotated[float | None, not_negative("rise and fall of a trapezoid, each; 0 is a sine, the "
+        "default but for a speed drive: twice the time that its acceleration takes", high=1e6,
+        example="0.2 s")] = None
     load_Nm: Annotated[float | None, quantity("load torque, all the time; default the largest of "
-        "validation.loads", example="4 N*m")] = None
+        "validation.loads, against a speed drive", example="4 N*m")] = None
     share: Annotated[float | None, positive("share of the time in motion; default 1", high=1.0,
         example="0.4")] = None
     cycle_s: Annotated[float | None, positive("one motion and one rest together; default 10 s", high=1e6,

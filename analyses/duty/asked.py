@@ -7,7 +7,7 @@ from math import inf, isfinite, pi
 from typing import TYPE_CHECKING, Annotated
 
 from actuator_lti.errors import InputError
-from analyses.request import Option, given
+from analyses.request import Option, given, key_of
 
 if TYPE_CHECKING:
     from actuator_lti.design.model import Design
@@ -67,9 +67,8 @@ class Asked:
         """Refuse what is no duty."""
         sizes = [name for name in SIZES.values() if getattr(self, name) is not None]
         if len(sizes) != 1:
-            raise InputError(
-                f"{' and '.join(sizes) or 'no peak'}: allowed: one of {', '.join(SIZES.values())}"
-            )
+            several, one_of = " and ".join(map(key_of, sizes)), ", ".join(map(key_of, SIZES.values()))
+            raise InputError(f"{several or 'no peak'}: allowed: one of {one_of}")
         for name in (*sizes, "frequency_hz", "cycle_s"):
             if not 0.0 < getattr(self, name) < inf:
                 raise InputError(f"{name} = {getattr(self, name):.6g}: must be positive and finite")
@@ -89,9 +88,12 @@ class Asked:
         stage = design.controller.outermost
         size: float | None = getattr(self, SIZES.get(stage, ""), None)
         if size is None:
-            given = ", ".join(name for name in SIZES.values() if getattr(self, name) is not None)
+            name, value = next(
+                (name, one) for name in SIZES.values() if (one := getattr(self, name)) is not None
+            )
             raise InputError(
-                f"{given}: this drive's command is a {stage}; allowed: {SIZES.get(stage, 'none')}"
+                f"{name} = {value:.6g}: this drive's command is a {stage}; "
+                f"allowed: {key_of(SIZES.get(stage, 'none'))}"
             )
         return size
 

@@ -139,8 +139,11 @@ def cases_of(design: Design, asked: Asked) -> tuple[tuple[Case, ...], dict[str, 
         more = "a DC equivalent has one winding; the pulsating torque of two phases left is not modelled"
         open_phase += f" ({more})"
     W, stage = asked.speed_rad_s, design.controller.outermost
+    # Of a drive that turns either way: one overspeeds it, the other adds its back-EMF to the bus
+    over, ways = "the power stage puts the whole bus on the motor", (1.0, -1.0) if W else (1.0,)
+    over += ", either way" * (len(ways) > 1)
     made = (
-        Case("hard-over", "the power stage puts the whole bus on the motor", lambda _: W, _hard_over, W),
+        *(Case("hard-over", over, lambda _: W, partial(_hard_over, way=way), W) for way in ways),
         Case("open-phase", open_phase, lambda _: W, _open, W),
     )
     if stage == "voltage":
@@ -174,13 +177,17 @@ def _of_position(design: Design, asked: Asked) -> tuple[Case, ...]:
 
 def _of_speed(design: Design, asked: Asked) -> tuple[Case, ...]:
     W, far = asked.speed_rad_s, full_command(design)
-    over, turns = f"the command jumps to {_size(design, far)}", f"while the drive turns at {_size(design, W)}"
+    over, turns = (
+        f"the command jumps to ±{_size(design, far)}",
+        f"while the drive turns at {_size(design, W)}",
+    )
     energy = 0.5 * design.motor_side_inertia_kgm2 * (W * design.total_ratio) ** 2
     jams = f"the output jams {turns}, {energy:.3g} J in what turns before the coupling"
     if design.coupling is None:
         jams = f"the output jams {turns}; the {energy:.3g} J that turn are no part of this torque"
     return (
         Case("hard-over-command", over, lambda _: far, start=W),
+        Case("hard-over-command", over, lambda _: -far, start=W),
         Case("jam", jams, lambda _: W, _jam, start=W, stops=False),
         Case("lost-sensor", f"the speed sensor stops counting {turns}", lambda _: W, _sense, start=W),
         *_swings(design, NEAR_SHARE * far, W),
@@ -214,8 +221,8 @@ def _swings(design: Design, size: float, around: float = 0.0) -> Iterator[Case]:
         yield Case("oscillatory-command", words, command, start=around, stops=False)
 
 
-def _hard_over(rig: Rig) -> None:
-    rig.driving = lambda _, bus: bus
+def _hard_over(rig: Rig, *, way: float) -> None:
+    rig.driving = lambda _, bus: way * bus
 
 
 def jammed(design: Design) -> Design:

@@ -159,10 +159,12 @@ def _hold(rig: Rig, start: float, wait: int, most: int) -> None:
 
 def _settling_s(design: Design, asked: Asked) -> float:
     """Time to reach half the stop, or the speed before, and settle."""
-    # A load torque that does not reach the motor shows none of the poles by which the command is followed
-    followed, period = assemble_loops(design).plain_response, design.controller.period_s
+    # A load torque that does not reach the motor shows none of the poles by which the command is followed;
+    # what passes as a drive turns makes none unstable
+    there = design if design.controller.position is not None else straight(design)
+    followed, period = assemble_loops(there).plain_response, design.controller.period_s
     updates = [] if followed is None else np.abs(followed.poles()) ** (period / followed.dt)
-    slowest = max(float(compliance(design).slowest), *updates)
+    slowest = max(float(compliance(there).slowest), *updates)
     if slowest > 1.0 + 1e-9:
         raise UnstableError("failures: the closed loop is not stable")
     figures = drive_figures(design)
