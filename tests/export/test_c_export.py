@@ -239,7 +239,7 @@ def test_the_compiled_code_has_the_margins_of_the_loops(name: str) -> None:
 @needs_compiler
 def test_a_wrong_code_is_seen(monkeypatch) -> None:
     """The current controller's gain two per cent too high in the C file alone."""
-    text = LIBRARY.text()
+    text = replace(LIBRARY, forms=tuple).text()
     wrong = text.replace("p[CURRENT_GAIN]", "(1.02 * p[CURRENT_GAIN])")
     assert wrong != text
     monkeypatch.setattr(Library, "text", lambda _: wrong)
