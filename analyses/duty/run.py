@@ -66,6 +66,11 @@ class Duty:
     heating: Heating | None
 
     @property
+    def period_ticks(self) -> int:
+        """Rows of one period of the motion."""
+        return _period(self.asked, self.design.controller.period_s, self.time_s.size)
+
+    @property
     def rms_torque_Nm(self) -> float:
         """Of the motor, over the cycle."""
         return float(winding(self.design.effective_motor)[1] * self.rms_A)
@@ -226,9 +231,14 @@ def _overload(design: Design, asked: Asked, current: Floats, held: float) -> Ove
     cycles = bisect_left(range(MOST_CYCLES), 1.0, key=lambda k: cycle(settled * (1.0 - slope**k))[0])
     if asked.share < 1.0:
         return Overload(peak, (cycles + 1) * (moving * Ts + rest_s))
-    one = drive.size // max(1, round(drive.size * Ts * asked.frequency_hz))  # period of those that are taken
+    one = _period(asked, Ts, drive.size)
     over = int(np.argmax(decay * settled * (1.0 - slope**cycles) + gained >= 1.0))
     return Overload(peak, (cycles * drive.size + (over // one + 1) * one) * Ts)
+
+
+def _period(asked: Asked, Ts: float, taken: int) -> int:
+    """Ticks of a period, of those of all that are taken."""
+    return taken // max(1, round(taken * Ts * asked.frequency_hz))
 
 
 def _moving_ticks(asked: Asked, Ts: float, period: int) -> int:

@@ -4,6 +4,8 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
+import numpy as np
+
 from actuator_lti.asked.verdict import Verdict
 from actuator_lti.drive.operating import follows_angle, runs
 from analyses.duty.run import Duty
@@ -118,18 +120,18 @@ def _row(what: str, value: float, limit: float, unit: str, when: float | None = 
 
 def _figure(result: Duty) -> doc.Block:
     chart = style.Chart(width=style.WIDE, height=320.0)
-    count = max(1, round(len(result.time_s) * result.design.controller.period_s * result.asked.frequency_hz))
-    periods = "one period" if count == 1 else f"{count} periods"
-    panel = chart.panel(y="current, A", title=f"{periods.capitalize()} of the motion")
-    every, last = max(1, len(result.time_s) // _SHOWN), float(result.time_s[-1])
-    scale = style.time_axis(panel, last)
-    panel.curve(result.time_s[::every] * scale, result.current_A[::every], "current", **style.series(0))
+    panel, rows = chart.panel(y="current, A", title="One period of the motion"), result.period_ticks
+    every, last = max(1, rows // _SHOWN), float(result.time_s[rows - 1])
+    scale, first = style.time_axis(panel, last), int(np.argmax(np.abs(result.current_A))) // rows * rows
+    current = result.current_A[first : first + rows : every]
+    panel.curve(result.time_s[:rows:every] * scale, current, "current", **style.series(0))
     panel.rule_y(result.rms_A, "rms of the duty", seen=True, colour=style.BLUE, dash=1)
     if math.isfinite(result.continuous_A):
         panel.rule_y(result.continuous_A, "continuous", seen=True, colour=style.RED, dash=2)
     panel.x.limits(0.0, last * scale)
-    caption = f"Motor current over {periods} of the motion."
-    caption += " As many come nearest to whole turns of the load." * (count > 1)
+    caption, periods = "Motor current over one period of the motion", len(result.time_s) // rows
+    caption += f", the largest of {periods}, which come nearest to whole turns of the load" * (periods > 1)
+    caption += "."
     if result.heating is not None:
         caption += " Right: the winding from ambient."
         panel, heat = chart.panel(y="winding, °C", title="Winding"), result.heating
