@@ -66,7 +66,7 @@ def _term(model: JointModel, speed: float) -> Bend:
     tables, rests, fitted = [], [], []
     for weight, part in zip(model.weights, model.records, strict=True):
         rows = part.compared if model.simulated else away_from_reversals(part)
-        term, used = _bent(part.speed, speed), part.compared
+        term, used = part.answered(_bent(part.speed, speed)), part.compared
         tables.append(weight * np.column_stack([part.w, *kept_columns(model, part), term])[rows])
         rests.append(weight * part.noise[rows[used]])
         fitted.append(weight * np.column_stack([part.w, term])[used])
@@ -94,11 +94,11 @@ def kept_columns(model: JointModel, part: RecordFit) -> Iterator[Floats]:
     """Acceleration, speed and direction as far as none of it is free: what a model keeps may be off."""
     kinds = {name.partition("_")[0] for name in model.names}
     if "inertia" not in kinds:
-        yield part.acceleration
+        yield part.answered(part.acceleration)
     if not kinds & {"viscous", "map"}:
-        yield part.speed
+        yield part.answered(part.speed)
     if not kinds & {"dry", "map"}:
-        yield np.sign(part.speed)
+        yield part.answered(np.sign(part.speed))
 
 
 def _bent(speed: Floats, below: float) -> Floats:

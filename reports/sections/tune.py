@@ -4,16 +4,13 @@ from pathlib import Path
 
 from actuator_lti.asked.quantities import with_unit
 from actuator_lti.asked.verdict import Verdict
-from actuator_lti.design.access import located
-from actuator_lti.design.fields import Structure
 from actuator_lti.design.model import Design
-from actuator_lti.design.writing import write_changed
+from actuator_lti.design.writing import value_as_stated, write_changed
 from actuator_lti.files.atomic import write_text
 from analyses.tuning.result import BindingRequirement, TuningResult
-from nonlinear.runs.trajectory import COMMAND_UNITS
 from reports import document as doc
 from reports.charts import style
-from reports.sections.names import Unit
+from reports.sections.names import command_unit
 from reports.sections.requirements import item, label, table
 
 
@@ -91,8 +88,7 @@ def _at_limit(r: BindingRequirement) -> bool:
 
 
 def _verdict(r: BindingRequirement, design: Design) -> doc.VerdictItem:
-    units = {path: located(design, path)[0].unit(Structure.of(design)) for path in r.corner}
-    said = (f"{path} {with_unit(value, units[path], '.4g')}" for path, value in r.corner.items())
+    said = (f"{path} {value_as_stated(design, path, value)}" for path, value in r.corner.items())
     corner = "; ".join(said) or "nominal"
     reason = [_amount(r)] * (r.distance is None) + ["binds"] * r.binds + [f"at {corner}"]
     return doc.verdict(
@@ -148,10 +144,9 @@ def _curve(result: TuningResult) -> doc.Block:
 
 
 def checks(result: TuningResult) -> doc.Block:
-    unit, per_SI = COMMAND_UNITS[result.design.axis, result.design.controller.outermost]
     columns = [
         doc.of("corner", "corner", "Design"),
-        doc.of("amplitude_rad", "amplitude", "Step", **Unit(per_SI, unit).column()),
+        doc.of("amplitude_rad", "amplitude", "Step", **command_unit(result.design).column()),
         doc.of("rise_time_s", "rise", "Rise", "ms", scale=1e3, format="ms:3", better=-1),
         doc.of("overshoot_percent", "overshoot", "Overshoot", "%", format="fix:1", better=-1),
         doc.of("settling_time_s", "settling", "Settling 2 %", "ms", scale=1e3, format="ms:3", better=-1),
