@@ -4,12 +4,16 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
+import numpy as np
+
 from actuator_lti.asked.verdict import Verdict
+from actuator_lti.drive.operating import follows_angle, runs
 from analyses.duty.run import Duty
 from reports import document as doc
 from reports.charts import style
+from reports.numbers import seconds
 from reports.sections import requirements
-from reports.sections.names import output_unit
+from reports.sections.names import command_unit, push_words
 
 _SHOWN = 400
 
@@ -21,6 +25,8 @@ def section(result: Duty) -> doc.Section:
         "and drives the overload state."
     )
     note = f"Duty: {asked_words(result)}."
+    if runs(result.design) and follows_angle(result.design) and result.asked.share < 1.0:
+        note += " The load turns with the drive: this is one motion of many, which begin at other angles."
     if result.heating is None:
         note += " No winding temperature: the design states no temperature.thermal_resistance."
     if result.overload is None:
@@ -48,8 +54,12 @@ _COLUMNS = [
 
 
 def asked_words(result: Duty) -> str:
-    asked = result.asked
-    words = f"±{output_unit(result.design.axis).of(asked.amplitude_rad)} at {asked.frequency_hz:.3g} Hz"
+    asked, size = result.asked, command_unit(result.design).of(result.asked.size_of(result.design))
+    words = f"±{size} at {asked.frequency_hz:.3g} Hz"
+    if asked.ramp_s > 0.0:
+        words = f"0 to {size} and back in {seconds(asked.ramp_s)} each, at {asked.frequency_hz:.3g} Hz"
+    if asked.current_A is not None:
+        words += ", the output held,"
     words += f" under {asked.load_Nm:.3g} {result.design.load_unit}"
     if asked.share < 1.0:
         words += f", {100.0 * asked.share:.3g} % of every {asked.cycle_s:.3g} s"
@@ -86,6 +96,16 @@ def _rows(result: Duty) -> list[doc.Row]:
     ]
     rows += [_row("current at rest, rms", result.holding_A, math.inf, "A")] * (result.asked.share < 1.0)
     rows.append({**_row("current, peak", result.peak_A, peak, "A"), "_status": None})
+    push, unit = push_words(result.design), result.design.load_unit
+    figures = (
+        (f"motor {push}, rms over time", result.rms_torque_Nm, unit),
+        (f"motor {push}, peak", result.peak_torque_Nm, unit),
+        ("copper loss, mean", result.copper_W, "W"),
+        ("power from the supply, mean", result.mean_power_W, "W"),
+        ("power from the supply, peak", result.peak_power_W, "W"),
+        ("power back to the supply, peak", result.fed_back_W, "W"),
+    )
+    rows += [_row(what, value, math.inf, unit) for what, value, unit in figures]
     if over is not None:
         rows.append(_row("overload state, peak", over.peak, 1.0, "", over.acts_after_s))
     if heat is not None:
@@ -100,15 +120,18 @@ def _row(what: str, value: float, limit: float, unit: str, when: float | None = 
 
 def _figure(result: Duty) -> doc.Block:
     chart = style.Chart(width=style.WIDE, height=320.0)
-    panel = chart.panel(y="current, A", title="One period of the motion")
-    every, last = max(1, len(result.time_s) // _SHOWN), float(result.time_s[-1])
-    scale = style.time_axis(panel, last)
-    panel.curve(result.time_s[::every] * scale, result.current_A[::every], "current", **style.series(0))
+    panel, rows = chart.panel(y="current, A", title="One period of the motion"), result.period_ticks
+    every, last = max(1, rows // _SHOWN), float(result.time_s[rows - 1])
+    scale, first = style.time_axis(panel, last), int(np.argmax(np.abs(result.current_A))) // rows * rows
+    current = result.current_A[first : first + rows : every]
+    panel.curve(result.time_s[:rows:every] * scale, current, "current", **style.series(0))
     panel.rule_y(result.rms_A, "rms of the duty", seen=True, colour=style.BLUE, dash=1)
     if math.isfinite(result.continuous_A):
         panel.rule_y(result.continuous_A, "continuous", seen=True, colour=style.RED, dash=2)
     panel.x.limits(0.0, last * scale)
-    caption = "Motor current over one period of the motion."
+    caption, periods = "Motor current over one period of the motion", len(result.time_s) // rows
+    caption += f", the largest of {periods}, which come nearest to whole turns of the load" * (periods > 1)
+    caption += "."
     if result.heating is not None:
         caption += " Right: the winding from ambient."
         panel, heat = chart.panel(y="winding, °C", title="Winding"), result.heating
