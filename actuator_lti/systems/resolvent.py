@@ -44,8 +44,9 @@ def _by_schur_form(A: np.ndarray, right: np.ndarray, points: np.ndarray) -> np.n
             x[:, row] /= (points - T[row, row])[:, None]
         return np.asarray(Q @ x)
 
-    found = solved(right)
-    return found + solved(right - (points[:, None, None] * found - A @ found))
+    with np.errstate(divide="ignore", invalid="ignore"):  # at a pole
+        found = solved(right)
+        return found + solved(right - (points[:, None, None] * found - A @ found))
 
 
 def balanced(A: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
