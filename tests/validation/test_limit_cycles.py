@@ -153,7 +153,7 @@ def test_cycles_of_the_fin_s_play_are_found_by_the_simulator() -> None:
 
 @pytest.mark.parametrize("slope", ["40 N*m/rad", "150 N*m/rad"])
 def test_a_load_that_tips_over_within_the_play_makes_no_cycle_there(slope: str) -> None:
-    """It goes away without turning back: the border was a cycle of twenty minutes, and simulated for as long."""
+    """It goes away and does not turn back: that was a cycle of twenty minutes, and simulated for as long."""
     pushed = with_overrides(FIN, {"load.moment_slope": slope})
     (cycle,) = cycles_of_play(pushed, friction=False)
     assert cycle.stable
