@@ -94,15 +94,11 @@ def finite_number(name: str, value: Any, allowed: str = "a finite number, in SI"
     return number
 
 
-def instance_of(name: str, value: Any, kind: type) -> None:
-    """Refuse an argument that is nothing of a kind.
-
-    >>> instance_of("values", 5, dict)
-    Traceback (most recent call last):
-    actuator_lti.errors.InputError: values = 5: must be a dict
-    """
-    if not isinstance(value, kind):
-        raise InputError(f"{name} = {shown(value)}: must be a {kind.__name__}")
+def positive_number(name: str, value: Any) -> float:
+    """An argument that is one finite number above 0."""
+    if (number := finite_number(name, value, allowed := "positive and finite, in SI")) <= 0.0:
+        raise InputError(f"{name} = {number:g}: must be {allowed}")
+    return number
 
 
 def delay_number(delay_s: Any) -> float:

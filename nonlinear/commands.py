@@ -19,6 +19,7 @@ import numpy.typing as npt
 
 from actuator_lti.bounds import SIGNAL_ROWS, TONE_TICKS, TONES, Bound
 from actuator_lti.errors import InputError, finite_number, shown, whole_number
+from actuator_lti.start.border import guard
 from actuator_lti.types import Floats, number_array
 from nonlinear._kernels import layout as at
 from nonlinear.native import fill
@@ -416,3 +417,6 @@ def recorded(
         raise InputError(message, where=str(path))
     times, angles = read_columns(path, (time_column, angle_column), delimiter)
     return (events if held else sampled)(times, angles * scale, where=str(path))
+
+
+guard(__name__)
