@@ -24,7 +24,7 @@ from analyses.specification.requirements import (
     judged_nominally,
     tally,
 )
-from analyses.specification.sensitivity import moved, population_figures
+from analyses.specification.sensitivity import moved, population_loop_figures
 from analyses.studies.sampling import Factor
 
 
@@ -184,7 +184,7 @@ def worst_ends(design: Design, quantity: str) -> dict[str, float]:
     ends = [end for each in drawn(design) for end in _ends(design, *each)]
     base = {path: float(design.parameters[path].value) for end in ends for path in end}
     try:
-        figures = population_figures(moved(design, base, ends), design)
+        figures = population_loop_figures(moved(design, base, ends), design)
     except InputError:
         return {}
     better = QUANTITIES[quantity].better
