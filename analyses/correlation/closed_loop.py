@@ -9,10 +9,10 @@ import numpy as np
 
 from actuator_lti.design.loader import AnyDesign, as_design
 from actuator_lti.design.model import Design
-from actuator_lti.drive.steady import motor_torque_Nm
 from actuator_lti.errors import InputError
 from actuator_lti.types import Floats, Progress
 from analyses.correlation import driving
+from analyses.correlation.between_ticks import signals_at
 from analyses.correlation.compare import SignalComparison, compare_signals
 from analyses.correlation.following import followed, following_finding
 from analyses.records.consistency import Finding, because, check_record
@@ -32,6 +32,9 @@ FIRST_ROWS = 50
 ANSWERS = ("angle", "output_angle", "position", "speed", "velocity", "current", "force")
 """What tells when a step of the command acted, the surest first."""
 STEP_ROUNDS = 6
+ROWS_ROUNDS = 3
+ROWS_ASIDE = 1e-2  # of a tick
+HOLD_ROUNDING = 1e-3  # of a tick
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -182,11 +185,14 @@ def _nearest(
     command: str | None = None,
 ) -> _Modelled:
     """The reading of a command with which a run is nearest, that run and its signals."""
-    driven = driving.needed_command(design, record, command)
+    readings = driving.readings(driving.needed_command(design, record, command), record)
+    driven = readings[0]
     notes.extend(driven.notes)
     time, even = record.time_s - record.time_s[0], period_of(record) * np.arange(len(record))
     if (np.abs(time - even) <= 4.0 * np.spacing(np.abs(record.time_s).max())).all():
         time = even  # stamps of an epoch have few digits: a step of the command would miss its tick
+    if driven.hold is not None:
+        time = driven.hold.row_s * np.arange(len(record)) + driven.hold.ahead_s(driven.likely_s)
     supply = driving.supply_of(driven, record, time, notes)
     model, load = driving.load_of(driven.design, record, time, notes)
     period = model.controller.period_s
@@ -202,15 +208,14 @@ def _nearest(
     if moving is not initial:
         part = {name: values[:FIRST_ROWS] for name, values in measured.items()}
         until = float(time[:FIRST_ROWS][-1]) + 2.0 * period
-        early = np.zeros(len(driven.steps))
+        early = driven.likely_s
         rest, goes = (
-            _series(model, run(driven, early, until=until, at=at), time) for at in (initial, moving)
+            signals_at(model, run(driven, early, until=until, at=at), time) for at in (initial, moving)
         )
         if _off(part, goes) < _off(part, rest):
             initial = moving
             notes.append("the record begins in motion or under load, and so does the model")
     whole = partial(run, at=initial, progress=progress)
-    readings = driving.readings(driven, record)
     tried = [_with_steps(one, time, measured, partial(whole, one)) for one in readings]
     best = min(tried, key=lambda each: _off(measured, each[2]))
     notes.append(f"model: {len(best[1].time_s)} ticks of {period * 1e6:g} us, command {best[0].between}")
@@ -231,39 +236,54 @@ def _with_steps(
     The record says between which samples a step was written, the answer to it at which tick: from a tick
     after the later sample (written before it acts) to the earlier one.
     """
-    tick, (least, most) = driven.design.controller.period_s, ticks_early(driven.design, time)
-    early = np.zeros(len(driven.steps)) if driven.early_s is None else driven.early_s
+    tick, early = driven.design.controller.period_s, driven.likely_s
     made = run(early)
-    series = _series(driven.design, made, time)
+    series = signals_at(driven.design, made, time)
     name = next((name for name in ANSWERS if name in measured), "")
     for _ in range(STEP_ROUNDS if driven.early_s is None and len(early) and name else 0):
+        least, most = _more_ticks(driven, time, early)
         more = driving.earlier_s(driven, time, measured[name], series[name])
-        moved = tick * np.clip(np.round((early + more) / tick), least, most)
+        moved = early + tick * np.clip(np.round(more / tick), least, most)
         if np.array_equal(moved, early):
             break
         other = run(moved)
-        if _off(measured, nearer := _series(driven.design, other, time)) >= _off(measured, series):
+        if _off(measured, nearer := signals_at(driven.design, other, time)) >= _off(measured, series):
             break
         early, made, series = moved, other, nearer
+    if driven.hold is not None and not driven.hold.is_whole:
+        more_s = _earlier_rows_s(driven, made, time, measured, driven.hold.more_s(early))
+        early, series = early + more_s, signals_at(driven.design, made, time + more_s)
     return replace(driven, early_s=early), made, series
+
+
+def _more_ticks(driven: driving.Driven, time: Floats, early_s: Floats) -> tuple[Floats, Floats]:
+    """By how many ticks less and more early each step may be taken."""
+    tick = driven.design.controller.period_s
+    if driven.hold is not None:
+        least, most = np.array(driven.hold.more_s(early_s)) / tick
+        return np.ceil(least - HOLD_ROUNDING), np.floor(most + HOLD_ROUNDING)
+    least, most = ticks_early(driven.design, time)
+    return np.asarray(least - early_s / tick), np.asarray(most - early_s / tick)
+
+
+def _earlier_rows_s(
+    driven: driving.Driven, run: Trajectory, time: Floats, measured: Mapping[str, Floats], within: tuple[float, float]
+) -> float:
+    """By how much later on the drive's own clock the rows are, with which they meet its run best.
+
+    Of what does not jump with the ticks, each signal by its size, as in `_off`; Gauss-Newton.
+    """
+    names, more, aside = [name for name in measured if name != "voltage"], 0.0, ROWS_ASIDE * run.period_s
+    sizes = np.array([measured[name] @ measured[name] for name in names])
+    for _ in range(ROWS_ROUNDS):
+        asides = (signals_at(driven.design, run, time + more + one) for one in (-aside, 0.0, aside))
+        early, here, late = (np.array([one[name] for name in names]) for one in asides)
+        off, rates = np.array([measured[name] for name in names]) - here, (late - early) / (2.0 * aside)
+        gained, steep = (np.sum(rates * one, axis=1) @ (1.0 / sizes) for one in (off, rates))
+        more = float(np.clip(more + gained / max(steep, 1e-300), *within))
+    return more
 
 
 def ticks_early(design: Design, time_s: Floats) -> tuple[float, float]:
     """By how many ticks a step of the command comes before the row that shows it, at least and at most."""
     return -1.0, float(np.floor(np.median(np.diff(time_s)) / design.controller.period_s * (1.0 + 1e-9)))
-
-
-def _series(design: Design, run: Trajectory, time: Floats) -> dict[str, Floats]:
-    """The signals of a run at some times, under the names of a record."""
-    rate = run.output_speed_rad_s
-    signals = {
-        "angle": run.motor_angle_rad,
-        "output_angle": run.output_angle_rad,
-        "position": run.output_angle_rad,
-        "speed": run.motor_speed_rad_s,
-        "velocity": run.motor_speed_rad_s / design.total_ratio if rate is None else rate,
-        "current": run.current_A,
-        "voltage": run.voltage_V,
-        "force": motor_torque_Nm(design, run.current_A, run.voltage_V),
-    }
-    return {name: np.interp(time, run.time_s, values) for name, values in signals.items()}
