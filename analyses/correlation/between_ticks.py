@@ -63,7 +63,9 @@ def _bent(design: Design, run: Trajectory, tick: Ints, late_s: Floats) -> Floats
     def moved(from_tick: Floats, until: Floats) -> Floats:
         """Current, speed and angle at ``until`` after the tick, from those two there, two voltages, a torque."""
         state, area = into @ from_tick[:2], np.zeros(1)
-        for volts, span in zip(from_tick[2:4], (np.minimum(until, split), np.maximum(until - split, 0.0)), strict=True):
+        for volts, span in zip(
+            from_tick[2:4], (np.minimum(until, split), np.maximum(until - split, 0.0)), strict=True
+        ):
             push = into @ np.stack([volts / L, from_tick[4] / J])
             grown = np.expm1(rates[:, None] * span) / rates[:, None]
             area = area + grown * state + (grown - span) / rates[:, None] * push
@@ -72,7 +74,14 @@ def _bent(design: Design, run: Trajectory, tick: Ints, late_s: Floats) -> Floats
 
     tick = np.minimum(tick, len(run.time_s) - 2)
     after = np.maximum(tick - int(queue), 0)
-    begun = np.stack([run.current_A[tick], run.motor_speed_rad_s[tick], run.voltage_V[np.maximum(after - 1, 0)], run.voltage_V[after]])
+    begun = np.stack(
+        [
+            run.current_A[tick],
+            run.motor_speed_rad_s[tick],
+            run.voltage_V[np.maximum(after - 1, 0)],
+            run.voltage_V[after],
+        ]
+    )
     arrives = moved(np.eye(5), np.full(5, T))[1]
     torque = (run.motor_speed_rad_s[tick + 1] - arrives[:4] @ begun) / arrives[4]
     current, speed, turned = moved(np.vstack([begun, torque]), late_s)

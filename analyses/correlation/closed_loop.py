@@ -12,7 +12,7 @@ from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
 from actuator_lti.types import Floats, Progress
 from analyses.correlation import driving
-from analyses.correlation.between_ticks import signals_at
+from analyses.correlation.between_ticks import AT_TICK, signals_at
 from analyses.correlation.compare import SignalComparison, compare_signals
 from analyses.correlation.following import followed, following_finding
 from analyses.records.consistency import Finding, because, check_record
@@ -251,8 +251,16 @@ def _with_steps(
             break
         early, made, series = moved, other, nearer
     if driven.hold is not None and not driven.hold.is_whole:
-        more_s = _earlier_rows_s(driven, made, time, measured, driven.hold.more_s(early))
-        early, series = early + more_s, signals_at(driven.design, made, time + more_s)
+        least, most = driven.hold.more_s(early)
+        more_s = _later_s(driven.design, made, time, measured, (least, most))
+        if driven.early_s is None:
+            early, time, more_s = (
+                early + (moved := np.clip(more_s, least, most)),
+                time + moved,
+                more_s - moved,
+            )
+        jumps = signals_at(driven.design, made, time)["voltage"]
+        series = {**signals_at(driven.design, made, time + more_s), "voltage": jumps}
     return replace(driven, early_s=early), made, series
 
 
@@ -266,21 +274,24 @@ def _more_ticks(driven: driving.Driven, time: Floats, early_s: Floats) -> tuple[
     return np.asarray(least - early_s / tick), np.asarray(most - early_s / tick)
 
 
-def _earlier_rows_s(
-    driven: driving.Driven, run: Trajectory, time: Floats, measured: Mapping[str, Floats], within: tuple[float, float]
+def _later_s(
+    design: Design, run: Trajectory, time: Floats, measured: Mapping[str, Floats], within: tuple[float, float]
 ) -> float:
-    """By how much later on the drive's own clock the rows are, with which they meet its run best.
+    """By how much later than ``time`` the rows likeliest are, on the drive's own clock.
 
-    Of what does not jump with the ticks, each signal by its size, as in `_off`; Gauss-Newton.
+    Each signal is weighed by what is left of it; beforehand every time within the ends is as likely. The
+    voltage tells nothing, as it jumps with the ticks.
     """
-    names, more, aside = [name for name in measured if name != "voltage"], 0.0, ROWS_ASIDE * run.period_s
-    sizes = np.array([measured[name] @ measured[name] for name in names])
+    middle, spread = np.mean(within), max(np.ptp(within), AT_TICK * run.period_s) / np.sqrt(12.0)
+    aside, more = ROWS_ASIDE * run.period_s, 0.0
+    names = [name for name in measured if name not in ("voltage", "force")]
     for _ in range(ROWS_ROUNDS):
-        asides = (signals_at(driven.design, run, time + more + one) for one in (-aside, 0.0, aside))
+        asides = (signals_at(design, run, time + more + one) for one in (-aside, 0.0, aside))
         early, here, late = (np.array([one[name] for name in names]) for one in asides)
         off, rates = np.array([measured[name] for name in names]) - here, (late - early) / (2.0 * aside)
+        sizes = np.maximum(np.mean(off**2, axis=1), 1e-300)
         gained, steep = (np.sum(rates * one, axis=1) @ (1.0 / sizes) for one in (off, rates))
-        more = float(np.clip(more + gained / max(steep, 1e-300), *within))
+        more += float((gained + (middle - more) / spread**2) / (steep + 1.0 / spread**2))
     return more
 
 

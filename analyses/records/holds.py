@@ -11,9 +11,9 @@ from scipy.optimize import minimize_scalar
 from actuator_lti.types import Floats, Ints
 from analyses.records.consistency import NO_CHANCE, RATE_TOLERANCE
 
-FINER = 4  # lines of the spectrum for one that the record resolves
-STRICT = 1e-9  # of a row
-ON_TICKS = 1e-3  # of a tick, within which rows stay with the ticks over the whole record
+FINER = 8  # lines of the spectrum for each that the record resolves
+ROUNDING = 1e-9  # of a row
+ON_TICKS = 1e-3  # of a tick: rows stay so close to the ticks over the whole record
 OPEN = 1e-5  # of a tick: a jump is not at the row before it
 
 
@@ -65,44 +65,46 @@ class Hold:
 def hold_of(rows: Ints, count: int, row_s: float, tick_s: float) -> Hold | None:
     """The longest hold of whole ticks with which each jump lies between its row and the one before.
 
-    ``rows``: the first row behind each jump, of ``count`` rows. None where the rows tell no more than that,
-    or chance would place so many jumps on one of the grids that were tried.
+    ``rows``: the first row behind each jump, of ``count`` rows. The tick may be off as a clock may be. None
+    where every row shows a jump, or where chance would place so many on one of the grids that were tried.
+
+    >>> jumps = np.arange(1, 400)
+    >>> hold = hold_of(np.ceil(2.5 * jumps - 0.7).astype(int), 1000, 2e-4, 1e-4)
+    >>> hold.ticks, hold.tick_s, round(hold.earliest_s, 7), round(hold.latest_s, 7)
+    (5, 0.0001, 0.0003, 0.0004)
     """
     return _hold_of(tuple(rows.tolist()), count, float(row_s), float(tick_s))
 
 
 @lru_cache(maxsize=64)
 def _hold_of(jumps: tuple[int, ...], count: int, row_s: float, tick_s: float) -> Hold | None:
-    rows, tick = np.array(jumps, dtype=np.int64), tick_s / row_s
-    if len(rows) < 3 or rows[-1] - rows[0] == len(rows) - 1:
+    first, tick = np.array(jumps, dtype=np.int64), tick_s / row_s
+    if len(first) < 3 or first[-1] - first[0] == len(first) - 1:
         return None
-    rows = rows - rows[0]
+    rows = first - first[0]
     most = int((np.diff(rows).min() + 1) / (tick * (1.0 - RATE_TOLERANCE)))
     line = np.abs(np.fft.rfft(np.bincount(rows, minlength=FINER * int(rows[-1]))))
     tried = np.log(max(most, 1) * float(rows[-1]) / NO_CHANCE)
     for ticks in range(most, 0, -1):
         by_chance = (len(rows) - 2) * np.log(max(ticks * tick, 1.0)) <= tried
-        if by_chance and not 1 == ticks < tick:  # at its own ticks it is sure
+        if by_chance and not 1 == ticks < tick:  # a jump is at a tick
             continue
         if (found := _grid(rows, line, ticks * tick)) is None:
             continue
         period, numbers = found
-        exact = max(round(period / tick), 1) * tick
-        early, late = _ends(rows, numbers, exact)
-        if late - early > STRICT:
-            period = exact
-        early, late = _ends(rows, numbers, period)
-        own = period / max(round(period / tick), 1)
-        is_whole = abs(1.0 / own - round(1.0 / own)) * count < ON_TICKS
+        whole = max(round(period / tick), 1)
+        if _room(rows, numbers, whole * tick) > ROUNDING:
+            period = whole * tick
+        latest = first - numbers * period
         return Hold(
-            ticks=round(period / own),
-            tick_s=own * row_s,
+            ticks=whole,
+            tick_s=period / whole * row_s,
             row_s=row_s,
-            rows=np.array(jumps, dtype=np.int64),
+            rows=first,
             numbers=numbers,
-            earliest_s=row_s * (jumps[0] + early),
-            latest_s=row_s * (jumps[0] + late),
-            is_whole=is_whole,
+            earliest_s=row_s * (float(latest.max()) - 1.0),
+            latest_s=row_s * float(latest.min()),
+            is_whole=abs(whole / period - round(whole / period)) * count < ON_TICKS,
         )
     return None
 
@@ -113,38 +115,34 @@ def _grid(rows: Ints, line: Floats, nominal: float) -> tuple[float, Ints] | None
     ``line`` is the spectrum of the jumps: on a grid all their phases are within a row, which gives them a
     line at its frequency, of at least ``cos(pi/period)`` of their number.
     """
-    least = len(rows) * np.cos(np.pi / max(nominal * (1.0 - RATE_TOLERANCE), 1.0))
 
     def turned(rate: float) -> complex:
         return complex(np.sum(np.exp(2j * np.pi * rate * rows)))
 
-    def numbered(rate: float, period: float) -> tuple[float, Ints] | None:
+    def numbered(rate: float) -> Ints:
         numbers = np.round(rate * rows - np.angle(turned(rate)) / (2.0 * np.pi)).astype(np.int64)
-        early, late = _ends(rows, numbers, period)
-        return (period, numbers - numbers[0]) if late - early > STRICT else None
+        return np.asarray(numbers - numbers[0])
 
-    if abs(turned(1.0 / nominal)) >= least and (exact := numbered(1.0 / nominal, nominal)):
-        return exact
+    if _room(rows, numbers := numbered(1.0 / nominal), nominal) > ROUNDING:
+        return nominal, numbers
     size = FINER * int(rows[-1])
     low, high = (size / nominal / (1.0 + side * RATE_TOLERANCE) for side in (1, -1))
-    bins = np.arange(int(low), min(int(high) + 2, size // 2 * 2))
-    heights = line[np.where(bins < len(line), bins, size - bins)]
-    if heights.max(initial=0.0) < 0.9 * least:
+    bins = np.arange(int(low), min(int(high) + 2, size))
+    heights = line[np.minimum(bins, size - bins)]
+    least = np.cos(np.pi / max(nominal * (1.0 - RATE_TOLERANCE), 1.0)) * np.sinc(0.5 / FINER)
+    if not heights.max(initial=0.0) > max(least, 0.0) * len(rows):
         return None
     top = float(bins[int(np.argmax(heights))])
-    ends = (top - 1.0) / size, (top + 1.0) / size
-    peak = minimize_scalar(lambda rate: -abs(turned(rate)), bounds=ends, method="bounded", options={"xatol": 1e-4 / size})
-    numbers = np.round(peak.x * rows - np.angle(turned(peak.x)) / (2.0 * np.pi)).astype(np.int64)
-
-    def narrow(rate: float) -> float:
-        early, late = _ends(rows, numbers, 1.0 / rate)
-        return early - late
-
-    found = minimize_scalar(narrow, bounds=ends, method="bounded", options={"xatol": 1e-9 / size})
-    return (1.0 / float(found.x), numbers - numbers[0]) if found.fun < -STRICT else None
+    near = {"bounds": ((top - 1.0) / size, (top + 1.0) / size), "method": "bounded"}
+    peak = minimize_scalar(lambda rate: -abs(turned(rate)), options={"xatol": 1e-4 / size}, **near)
+    numbers = numbered(float(peak.x))
+    widest = minimize_scalar(
+        lambda rate: -_room(rows, numbers, 1.0 / rate), options={"xatol": ROUNDING / size}, **near
+    )
+    return (1.0 / float(widest.x), numbers) if -widest.fun > ROUNDING else None
 
 
-def _ends(rows: Ints, numbers: Ints, period: float) -> tuple[float, float]:
-    """Between which rows the first jump may be: each comes after the row before its own, not after it."""
-    latest = rows - (numbers - numbers[0]) * period
-    return float(latest.max()) - 1.0, float(latest.min())
+def _room(rows: Ints, numbers: Ints, period: float) -> float:
+    """Rows between which the first jump may be: each is after the row before its own, and not after that."""
+    latest = rows - numbers * period
+    return float(latest.min() - latest.max()) + 1.0
