@@ -251,17 +251,20 @@ def _with_steps(
             break
         early, made, series = moved, other, nearer
     if driven.hold is not None and not driven.hold.is_whole:
-        least, most = driven.hold.more_s(early)
-        more_s = _later_s(driven.design, made, time, measured, (least, most))
+        ends, more_s = driven.hold.more_s(early), 0.0
         if driven.early_s is None:
-            early, time, more_s = (
-                early + (moved := np.clip(more_s, least, most)),
-                time + moved,
-                more_s - moved,
-            )
-        jumps = signals_at(driven.design, made, time)["voltage"]
-        series = {**signals_at(driven.design, made, time + more_s), "voltage": jumps}
+            more_s = float(np.clip(_later_s(driven.design, made, time, measured, ends), *ends))
+        jumps = signals_at(driven.design, made, time + np.clip(more_s, *ends))["voltage"]
+        early, series = early + more_s, {**signals_at(driven.design, made, time + more_s), "voltage": jumps}
     return replace(driven, early_s=early), made, series
+
+
+def later_s(design: Design, record: Record) -> tuple[float, float] | None:
+    """Ends of how much later the rows of a hold may be; None where they are at the drive's ticks."""
+    driven = driving.readings(driving.needed_command(design, record), record)[0]
+    if driven.hold is None or driven.hold.is_whole:
+        return None
+    return driven.hold.more_s(driven.likely_s)
 
 
 def _more_ticks(driven: driving.Driven, time: Floats, early_s: Floats) -> tuple[Floats, Floats]:

@@ -17,7 +17,7 @@ from actuator_lti.design import parameter_value, with_values
 from actuator_lti.design.model import Design
 from actuator_lti.errors import NumericalError
 from actuator_lti.types import Floats
-from analyses.correlation.closed_loop import as_driven, measured_signals, model_signals, ticks_early
+from analyses.correlation.closed_loop import as_driven, later_s, measured_signals, model_signals, ticks_early
 from analyses.estimation.fit import Fit
 from analyses.estimation.least_squares import wider_covariance
 from analyses.estimation.parameters import default_value, parameter
@@ -32,6 +32,7 @@ INDUCTANCE = parameter("inductance").key
 BACK, TORQUE = parameter("back_emf").key, parameter("torque_constant").key
 NOT_SHOWN = "the records do not show it (they are as likely with none)"
 NONE = 1e-6  # of the design's inductance: as good as none
+ASIDE = 0.01  # of the time between which the rows may be
 SETTLED = 0.05  # of what a signal leaves, within which its weight may still move
 
 
@@ -195,7 +196,11 @@ def _likeliest(
         left = np.array([np.std(rest) for rest in rests])
         sizes = sizes * left
         unlikely = float(2.0 * rows @ np.log(sizes))
-        if np.all(np.abs(left - 1.0) < SETTLED) or before - unlikely < unlikely - than:
+        told = [(w / size, e / size) for w, e, size in zip(slopes, rests, left, strict=True)]
+        parts, told, moved_s = _at_their_rows(start, parts, sizes, told)
+        if (
+            np.all(np.abs(left - 1.0) < SETTLED) and moved_s < SETTLED
+        ) or before - unlikely < unlikely - than:
             break
         before = unlikely
     return _Likeliest(
@@ -203,9 +208,43 @@ def _likeliest(
         keys=keys,
         parts=parts,
         sizes=sizes,
-        told=[(w / size, e / size) for w, e, size in zip(slopes, rests, left, strict=True)],
+        told=told,
         unlikely=unlikely,
     )
+
+
+def _at_their_rows(
+    design: Design, parts: Sequence[Record], sizes: Floats, told: Sequence[tuple[Floats, Floats]]
+) -> tuple[list[Record], list[tuple[Floats, Floats]], float]:
+    """The records with their rows where they likeliest are between the ticks, and the slopes without that.
+
+    ``told``: slopes over the values and what is left, of unit size. Also the largest of the moves, in its
+    standard errors. Beforehand every time that shows the same jumps is as likely.
+    """
+    parts, told, moves, whole = list(parts), list(told), [0.0], np.concatenate([w for w, _ in told])
+    for k, part in enumerate(parts):
+        if (ends := later_s(design, part)) is None:
+            continue
+        least, most = ends
+        aside = ASIDE * (most - least)
+
+        def drives(more: float, part: Record = part) -> list[Floats]:
+            moved = replace(part, early_s=np.asarray(part.early_s) + more)
+            return _drives([model_signals(design, moved, measured_signals(design, part))[0]])
+
+        pairs = zip(drives(aside), drives(-aside), sizes[2 * k : 2 * k + 2], strict=True)
+        column = np.concatenate([(up - down) / (2.0 * aside * size) for up, down, size in pairs])
+        here, known = told[2 * k : 2 * k + 2], 12.0 / (most - least) ** 2
+        w, rest = (np.concatenate(each) for each in zip(*here, strict=True))
+        own = column - w @ np.linalg.solve(whole.T @ whole, w.T @ column)
+        sure = own @ column + known
+        more = float(own @ rest + known * 0.5 * (least + most)) / sure
+        more = float(np.clip(more, 1.5 * least - 0.5 * most, 1.5 * most - 0.5 * least))
+        w = w - np.outer(column, column @ w / (column @ column + known))
+        told[2 * k : 2 * k + 2] = zip(np.split(w, 2), (e for _, e in here), strict=True)
+        parts[k] = replace(part, early_s=np.asarray(part.early_s) + more)
+        moves.append(abs(more) * np.sqrt(sure))
+    return parts, told, max(moves)
 
 
 def _at_its_ticks(design: Design, keys: tuple[str, ...], found: _Likeliest) -> Fit:
