@@ -61,7 +61,7 @@ def _bent(design: Design, run: Trajectory, tick: Ints, late_s: Floats) -> Floats
     queue, split = divmod(design.controller.computing_delay_s, T)
 
     def moved(from_tick: Floats, until: Floats) -> Floats:
-        """Current, speed and angle by which it turns, from the first two at the tick, two voltages, a torque."""
+        """Current, speed and angle turned, from the first two at the tick, two voltages and a torque."""
         state, area = into @ from_tick[:2], np.zeros(1)
         for volts, span in zip(
             from_tick[2:4], (np.minimum(until, split), np.maximum(until - split, 0.0)), strict=True

@@ -32,6 +32,7 @@ FIRST_ROWS = 50
 ANSWERS = ("angle", "output_angle", "position", "speed", "velocity", "current", "force")
 """What tells when a step of the command acted, the surest first."""
 STEP_ROUNDS = 6
+ROWS_PLACES = 16
 ROWS_ROUNDS = 3
 ROWS_ASIDE = 1e-2  # of a tick
 HOLD_ROUNDING = 1e-3  # of a tick
@@ -285,16 +286,24 @@ def _later_s(
     Each signal is weighed by what is left of it; beforehand every time within the ends is as likely. The
     voltage tells nothing, as it jumps with the ticks.
     """
-    middle, spread = np.mean(within), max(np.ptp(within), AT_TICK * run.period_s) / np.sqrt(12.0)
-    aside, more = ROWS_ASIDE * run.period_s, 0.0
+    spread, aside = max(np.ptp(within), AT_TICK * run.period_s) / np.sqrt(12.0), ROWS_ASIDE * run.period_s
     names = [name for name in measured if name not in ("voltage", "force")]
+    own = np.array([measured[name] for name in names])
+
+    def made(more: float) -> Floats:
+        series = signals_at(design, run, time + more)
+        return np.array([series[name] for name in names])
+
+    def unlikely(more: float) -> float:
+        return float(np.sum(np.log(np.mean((own - made(more)) ** 2, axis=1) + 1e-300)))
+
+    # the current turns where its voltage is switched, so that a search stays between two such rows
+    more = min(np.linspace(*within, ROWS_PLACES + 2)[1:-1].tolist(), key=unlikely)
     for _ in range(ROWS_ROUNDS):
-        asides = (signals_at(design, run, time + more + one) for one in (-aside, 0.0, aside))
-        early, here, late = (np.array([one[name] for name in names]) for one in asides)
-        off, rates = np.array([measured[name] for name in names]) - here, (late - early) / (2.0 * aside)
-        sizes = np.maximum(np.mean(off**2, axis=1), 1e-300)
+        off, rates = own - made(more), (made(more + aside) - made(more - aside)) / (2.0 * aside)
+        sizes = np.mean(off**2, axis=1) + 1e-300
         gained, steep = (np.sum(rates * one, axis=1) @ (1.0 / sizes) for one in (off, rates))
-        more += float((gained + (middle - more) / spread**2) / (steep + 1.0 / spread**2))
+        more += float((gained + (np.mean(within) - more) / spread**2) / (steep + 1.0 / spread**2))
     return more
 
 

@@ -33,6 +33,7 @@ BACK, TORQUE = parameter("back_emf").key, parameter("torque_constant").key
 NOT_SHOWN = "the records do not show it (they are as likely with none)"
 NONE = 1e-6  # of the design's inductance: as good as none
 ASIDE = 0.01  # of the time between which the rows may be
+PLACES = 16  # within it: what the current does after each switch of the voltage is a minimum of its own
 SETTLED = 0.05  # of what a signal leaves, within which its weight may still move
 
 
@@ -226,20 +227,35 @@ def _at_their_rows(
         if (ends := later_s(design, part)) is None:
             continue
         least, most = ends
-        aside = ASIDE * (most - least)
+        measured, here = measured_signals(design, part), told[2 * k : 2 * k + 2]
+        wanted, known = _drives([measured]), 12.0 / (most - least) ** 2
 
-        def drives(more: float, part: Record = part) -> list[Floats]:
+        def left(
+            more: float,
+            part: Record = part,
+            measured: Mapping[str, Floats] = measured,
+            wanted: list[Floats] = wanted,
+        ) -> Floats:
             moved = replace(part, early_s=np.asarray(part.early_s) + more)
-            return _drives([model_signals(design, moved, measured_signals(design, part))[0]])
+            made = _drives([model_signals(design, moved, measured)[0]])
+            return np.concatenate(
+                [(own - one) / size for own, one, size in zip(wanted, made, sizes[2 * k :], strict=False)]
+            )
 
-        pairs = zip(drives(aside), drives(-aside), sizes[2 * k : 2 * k + 2], strict=True)
-        column = np.concatenate([(up - down) / (2.0 * aside * size) for up, down, size in pairs])
-        here, known = told[2 * k : 2 * k + 2], 12.0 / (most - least) ** 2
-        w, rest = (np.concatenate(each) for each in zip(*here, strict=True))
-        own = column - w @ np.linalg.solve(whole.T @ whole, w.T @ column)
-        sure = own @ column + known
-        more = float(own @ rest + known * 0.5 * (least + most)) / sure
-        more = float(np.clip(more, 1.5 * least - 0.5 * most, 1.5 * most - 0.5 * least))
+        w = np.concatenate([slopes for slopes, _ in here])
+
+        def own_part(values: Floats, w: Floats = w) -> Floats:
+            return np.asarray(values - w @ np.linalg.solve(whole.T @ whole, w.T @ values))
+
+        places = [0.0, *np.linspace(least, most, PLACES + 2)[1:-1].tolist()]
+        rests = [left(more) for more in places]
+        more = places[int(np.argmin([rest @ own_part(rest) for rest in rests]))]
+        aside = ASIDE * (most - least)
+        column = (left(-aside) - left(aside)) / (2.0 * aside)
+        sure = column @ own_part(column) + known
+        if abs(more) <= places[2] - places[1]:
+            more = float(column @ own_part(rests[0]) + known * 0.5 * (least + most)) / sure
+            more = float(np.clip(more, 1.5 * least - 0.5 * most, 1.5 * most - 0.5 * least))
         w = w - np.outer(column, column @ w / (column @ column + known))
         told[2 * k : 2 * k + 2] = zip(np.split(w, 2), (e for _, e in here), strict=True)
         parts[k] = replace(part, early_s=np.asarray(part.early_s) + more)
