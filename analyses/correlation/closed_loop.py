@@ -12,7 +12,7 @@ from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
 from actuator_lti.types import Floats, Progress
 from analyses.correlation import driving
-from analyses.correlation.between_ticks import AT_TICK, signals_at
+from analyses.correlation.between_ticks import likeliest_s, signals_at
 from analyses.correlation.compare import SignalComparison, compare_signals
 from analyses.correlation.following import followed, following_finding
 from analyses.records.consistency import Finding, because, check_record
@@ -32,9 +32,6 @@ FIRST_ROWS = 50
 ANSWERS = ("angle", "output_angle", "position", "speed", "velocity", "current", "force")
 """What tells when a step of the command acted, the surest first."""
 STEP_ROUNDS = 6
-ROWS_PLACES = 16
-ROWS_ROUNDS = 3
-ROWS_ASIDE = 1e-2  # of a tick
 HOLD_ROUNDING = 1e-3  # of a tick
 
 
@@ -252,11 +249,13 @@ def _with_steps(
             break
         early, made, series = moved, other, nearer
     if driven.hold is not None and not driven.hold.is_whole:
-        ends, more_s = driven.hold.more_s(early), 0.0
+        ends = driven.hold.more_s(early)
         if driven.early_s is None:
-            more_s = float(np.clip(_later_s(driven.design, made, time, measured, ends), *ends))
-        jumps = signals_at(driven.design, made, time + np.clip(more_s, *ends))["voltage"]
-        early, series = early + more_s, {**signals_at(driven.design, made, time + more_s), "voltage": jumps}
+            more = likeliest_s(driven.design, made, time, measured, ends)
+            early, series = early + more, signals_at(driven.design, made, time + more)
+        else:  # what was found may be a little beyond the ends, but no row sees another voltage
+            more = float(np.clip(0.0, *ends))
+            series = signals_at(driven.design, made, time + more, -more)
     return replace(driven, early_s=early), made, series
 
 
@@ -276,35 +275,6 @@ def _more_ticks(driven: driving.Driven, time: Floats, early_s: Floats) -> tuple[
         return np.ceil(least - HOLD_ROUNDING), np.floor(most + HOLD_ROUNDING)
     least, most = ticks_early(driven.design, time)
     return np.asarray(least - early_s / tick), np.asarray(most - early_s / tick)
-
-
-def _later_s(
-    design: Design, run: Trajectory, time: Floats, measured: Mapping[str, Floats], within: tuple[float, float]
-) -> float:
-    """By how much later than ``time`` the rows likeliest are, on the drive's own clock.
-
-    Each signal is weighed by what is left of it; beforehand every time within the ends is as likely. The
-    voltage tells nothing, as it jumps with the ticks.
-    """
-    spread, aside = max(np.ptp(within), AT_TICK * run.period_s) / np.sqrt(12.0), ROWS_ASIDE * run.period_s
-    names = [name for name in measured if name not in ("voltage", "force")]
-    own = np.array([measured[name] for name in names])
-
-    def made(more: float) -> Floats:
-        series = signals_at(design, run, time + more)
-        return np.array([series[name] for name in names])
-
-    def unlikely(more: float) -> float:
-        return float(np.sum(np.log(np.mean((own - made(more)) ** 2, axis=1) + 1e-300)))
-
-    # the current turns where its voltage is switched, so that a search stays between two such rows
-    more = min(np.linspace(*within, ROWS_PLACES + 2)[1:-1].tolist(), key=unlikely)
-    for _ in range(ROWS_ROUNDS):
-        off, rates = own - made(more), (made(more + aside) - made(more - aside)) / (2.0 * aside)
-        sizes = np.mean(off**2, axis=1) + 1e-300
-        gained, steep = (np.sum(rates * one, axis=1) @ (1.0 / sizes) for one in (off, rates))
-        more += float((gained + (np.mean(within) - more) / spread**2) / (steep + 1.0 / spread**2))
-    return more
 
 
 def ticks_early(design: Design, time_s: Floats) -> tuple[float, float]:

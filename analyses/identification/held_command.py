@@ -17,6 +17,7 @@ from actuator_lti.design import parameter_value, with_values
 from actuator_lti.design.model import Design
 from actuator_lti.errors import NumericalError
 from actuator_lti.types import Floats
+from analyses.correlation.between_ticks import places_s
 from analyses.correlation.closed_loop import as_driven, later_s, measured_signals, model_signals, ticks_early
 from analyses.estimation.fit import Fit
 from analyses.estimation.least_squares import wider_covariance
@@ -33,7 +34,6 @@ BACK, TORQUE = parameter("back_emf").key, parameter("torque_constant").key
 NOT_SHOWN = "the records do not show it (they are as likely with none)"
 NONE = 1e-6  # of the design's inductance: as good as none
 ASIDE = 0.01  # of the time between which the rows may be
-PLACES = 16  # within it: what the current does after each switch of the voltage is a minimum of its own
 SETTLED = 0.05  # of what a signal leaves, within which its weight may still move
 
 
@@ -220,47 +220,50 @@ def _at_their_rows(
     """The records with their rows where they likeliest are between the ticks, and the slopes without that.
 
     ``told``: slopes over the values and what is left, of unit size. Also the largest of the moves, in its
-    standard errors. Beforehand every time that shows the same jumps is as likely.
+    standard errors.
     """
-    parts, told, moves, whole = list(parts), list(told), [0.0], np.concatenate([w for w, _ in told])
-    for k, part in enumerate(parts):
-        if (ends := later_s(design, part)) is None:
-            continue
-        least, most = ends
-        measured, here = measured_signals(design, part), told[2 * k : 2 * k + 2]
-        wanted, known = _drives([measured]), 12.0 / (most - least) ** 2
+    gram = sum(w.T @ w for w, _ in told)
+    pairs = [slice(k, k + 2) for k in range(0, len(told), 2)]
+    each = [
+        _at_its_rows(design, one, sizes[pair], told[pair], gram)
+        for one, pair in zip(parts, pairs, strict=True)
+    ]
+    return (
+        [one for one, *_ in each],
+        [one for _, two, _ in each for one in two],
+        max(move for *_, move in each),
+    )
 
-        def left(
-            more: float,
-            part: Record = part,
-            measured: Mapping[str, Floats] = measured,
-            wanted: list[Floats] = wanted,
-        ) -> Floats:
-            moved = replace(part, early_s=np.asarray(part.early_s) + more)
-            made = _drives([model_signals(design, moved, measured)[0]])
-            return np.concatenate(
-                [(own - one) / size for own, one, size in zip(wanted, made, sizes[2 * k :], strict=False)]
-            )
 
-        w = np.concatenate([slopes for slopes, _ in here])
+def _at_its_rows(
+    design: Design, part: Record, sizes: Floats, told: Sequence[tuple[Floats, Floats]], gram: Floats
+) -> tuple[Record, Sequence[tuple[Floats, Floats]], float]:
+    """The same of one record; beforehand every time at which its rows show the same jumps is as likely."""
+    if (ends := later_s(design, part)) is None:
+        return part, told, 0.0
+    measured, w = measured_signals(design, part), np.concatenate([slopes for slopes, _ in told])
 
-        def own_part(values: Floats, w: Floats = w) -> Floats:
-            return np.asarray(values - w @ np.linalg.solve(whole.T @ whole, w.T @ values))
+    def left(more: float) -> Floats:
+        moved = replace(part, early_s=np.asarray(part.early_s) + more)
+        pairs = zip(
+            _drives([measured]), _drives([model_signals(design, moved, measured)[0]]), sizes, strict=True
+        )
+        return np.concatenate([(own - made) / size for own, made, size in pairs])
 
-        places = [0.0, *np.linspace(least, most, PLACES + 2)[1:-1].tolist()]
-        rests = [left(more) for more in places]
-        more = places[int(np.argmin([rest @ own_part(rest) for rest in rests]))]
-        aside = ASIDE * (most - least)
-        column = (left(-aside) - left(aside)) / (2.0 * aside)
-        sure = column @ own_part(column) + known
-        if abs(more) <= places[2] - places[1]:
-            more = float(column @ own_part(rests[0]) + known * 0.5 * (least + most)) / sure
-            more = float(np.clip(more, 1.5 * least - 0.5 * most, 1.5 * most - 0.5 * least))
-        w = w - np.outer(column, column @ w / (column @ column + known))
-        told[2 * k : 2 * k + 2] = zip(np.split(w, 2), (e for _, e in here), strict=True)
-        parts[k] = replace(part, early_s=np.asarray(part.early_s) + more)
-        moves.append(abs(more) * np.sqrt(sure))
-    return parts, told, max(moves)
+    def alone(values: Floats) -> Floats:
+        return np.asarray(values - w @ np.linalg.solve(gram, w.T @ values))
+
+    wide, places = ends[1] - ends[0], [0.0, *places_s(ends)]
+    rests = [left(place) for place in places]
+    more = places[int(np.argmin([rest @ alone(rest) for rest in rests]))]
+    column, known = (left(-ASIDE * wide) - left(ASIDE * wide)) / (2.0 * ASIDE * wide), 12.0 / wide**2
+    sure = column @ alone(column) + known
+    if abs(more) <= places[2] - places[1]:
+        more = float(column @ alone(rests[0]) + known * np.mean(ends)) / sure
+        more = float(np.clip(more, ends[0] - 0.5 * wide, ends[1] + 0.5 * wide))
+    w = w - np.outer(column, column @ w / (column @ column + known))
+    own = list(zip(np.split(w, 2), (rest for _, rest in told), strict=True))
+    return replace(part, early_s=np.asarray(part.early_s) + more), own, abs(more) * float(np.sqrt(sure))
 
 
 def _at_its_ticks(design: Design, keys: tuple[str, ...], found: _Likeliest) -> Fit:
