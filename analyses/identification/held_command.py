@@ -190,7 +190,7 @@ def _likeliest(
         runs = [model_signals(tried, *each)[0] for each in zip(parts, measured, strict=True)]
         return weighed(_drives(runs))
 
-    for _ in range(rounds):
+    for turn in range(rounds):
         moved = fit_output(design, keys, made, weighed(wanted), begin=_values(start, keys))
         start = with_values(design, dict(zip(keys, moved.values.tolist(), strict=True)), check=False)
         slopes, rests = (np.split(each, np.cumsum(rows)[:-1]) for each in (moved.slopes, moved.rest))
@@ -198,7 +198,7 @@ def _likeliest(
         sizes = sizes * left
         unlikely = float(2.0 * rows @ np.log(sizes))
         told = [(w / size, e / size) for w, e, size in zip(slopes, rests, left, strict=True)]
-        parts, told, moved_s = _at_their_rows(start, parts, sizes, told)
+        parts, told, moved_s = _at_their_rows(start, parts, sizes, told, anywhere=turn == 0)
         if (
             np.all(np.abs(left - 1.0) < SETTLED) and moved_s < SETTLED
         ) or before - unlikely < unlikely - than:
@@ -215,17 +215,22 @@ def _likeliest(
 
 
 def _at_their_rows(
-    design: Design, parts: Sequence[Record], sizes: Floats, told: Sequence[tuple[Floats, Floats]]
+    design: Design,
+    parts: Sequence[Record],
+    sizes: Floats,
+    told: Sequence[tuple[Floats, Floats]],
+    *,
+    anywhere: bool,
 ) -> tuple[list[Record], list[tuple[Floats, Floats]], float]:
     """The records with their rows where they likeliest are between the ticks, and the slopes without that.
 
     ``told``: slopes over the values and what is left, of unit size. Also the largest of the moves, in its
-    standard errors.
+    standard errors. ``anywhere``: not only from where they are.
     """
     gram = sum(w.T @ w for w, _ in told)
     pairs = [slice(k, k + 2) for k in range(0, len(told), 2)]
     each = [
-        _at_its_rows(design, one, sizes[pair], told[pair], gram)
+        _at_its_rows(design, one, sizes[pair], told[pair], gram, anywhere)
         for one, pair in zip(parts, pairs, strict=True)
     ]
     return (
@@ -236,7 +241,12 @@ def _at_their_rows(
 
 
 def _at_its_rows(
-    design: Design, part: Record, sizes: Floats, told: Sequence[tuple[Floats, Floats]], gram: Floats
+    design: Design,
+    part: Record,
+    sizes: Floats,
+    told: Sequence[tuple[Floats, Floats]],
+    gram: Floats,
+    anywhere: bool,
 ) -> tuple[Record, Sequence[tuple[Floats, Floats]], float]:
     """The same of one record; beforehand every time at which its rows show the same jumps is as likely."""
     if (ends := later_s(design, part)) is None:
@@ -253,12 +263,12 @@ def _at_its_rows(
     def alone(values: Floats) -> Floats:
         return np.asarray(values - w @ np.linalg.solve(gram, w.T @ values))
 
-    wide, places = ends[1] - ends[0], [0.0, *places_s(ends)]
+    wide, places = ends[1] - ends[0], [0.0, *(places_s(ends) if anywhere else ())]
     rests = [left(place) for place in places]
     more = places[int(np.argmin([rest @ alone(rest) for rest in rests]))]
     column, known = (left(-ASIDE * wide) - left(ASIDE * wide)) / (2.0 * ASIDE * wide), 12.0 / wide**2
     sure = column @ alone(column) + known
-    if abs(more) <= places[2] - places[1]:
+    if abs(more) <= wide / len(places):
         more = float(column @ alone(rests[0]) + known * np.mean(ends)) / sure
         more = float(np.clip(more, ends[0] - 0.5 * wide, ends[1] + 0.5 * wide))
     w = w - np.outer(column, column @ w / (column @ column + known))
