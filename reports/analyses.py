@@ -97,7 +97,9 @@ class Analysis:
 
     def of_report(self, design: Design) -> list[Section]:
         """The sections of a report of a design, as asked for by default; the first has the verdict."""
-        result = self.run(design, *self.asked(design, {}))
+        from analyses.specification.asked_figures import answer_of
+
+        result = answer_of(design, self.name)
         first, *more = self.sections(result)
         verdict = self.verdict(result)
         return [first if verdict is None else {**first, "verdict": verdict.value}, *more]

@@ -13,10 +13,11 @@ from actuator_lti.errors import InputError
 from actuator_lti.files.reading import as_path
 from actuator_lti.loops import assemble_loops
 from actuator_lti.types import Progress
-from analyses.corners.run import Corners, corners
+from analyses.corners.run import Corners
 from analyses.isolation import attempt, isolated
 from analyses.linear.loop_survey import LoopSurvey, survey_loops
 from analyses.margins.run import measured_if_asked
+from analyses.specification.asked_figures import answer_of
 from analyses.specification.mending import mending
 from analyses.specification.requirements import RequirementVerdict, evaluate_requirements
 from analyses.specification.weakest import WeakPoint, spread, weakest
@@ -107,7 +108,7 @@ def design_report(
         if survey is not None:
             verdicts = attempt("requirements", lambda: evaluate_requirements(design, figures), ())
             loops = loop_sections(survey, verdicts)
-            bounds = attempt("corners", lambda: corners(design), None)
+            bounds = attempt("corners", lambda: answer_of(design, "corners"), None)
             point = attempt("weakest point", lambda: weakest(survey, bounds), None)
     loops, validation = in_amperes(loops, design), in_amperes(validation, design)
     first = [part for part in validation if part["id"] == "validation"]

@@ -9,7 +9,18 @@ from typing import Annotated, Any, Literal
 import numpy as np
 
 from actuator_lti.asked.quantities import QUANTITIES
-from actuator_lti.design.field import Axis, choice, day, label, limit, positive, quantities, quantity, text
+from actuator_lti.design.field import (
+    Axis,
+    choice,
+    day,
+    label,
+    limit,
+    not_negative,
+    positive,
+    quantities,
+    quantity,
+    text,
+)
 
 # fmt: off
 Rotor = Literal["free", "locked"]
@@ -32,18 +43,27 @@ class Failure:
         key="detection_time", high=1e4, example="50 ms")] = None
     load_Nm: Annotated[float | None, quantity("load torque that pushes the output forward; default none",
         example="4 N*m")] = None
+    speed_rad_s: Annotated[float | None, positive("speed at which a speed drive turns before, output side; "
+        "default half its top speed", example="100 deg/s")] = None
 
 
 @dataclass(frozen=True, kw_only=True)
 class DutyCycle:
     """The duty within the continuous rating; ``None`` is what `analyses.duty.Asked` takes for it."""
 
-    amplitude_rad: Annotated[float | None, positive("peak of the sine, output side; default half the full "
+    amplitude_rad: Annotated[float | None, positive("peak of the motion, output side; default half the full "
         "deflection", example="5 deg")] = None
-    frequency_rad_s: Annotated[float | None, positive("of the sine; default 1 Hz", unit="rad/s",
+    speed_rad_s: Annotated[float | None, positive("peak speed of a speed drive, output side; default half "
+        "its top speed", example="100 deg/s")] = None
+    current_A: Annotated[float | None, positive("peak current of a drive that is commanded in current; "
+        "default half the peak current", example="5 A")] = None
+    frequency_rad_s: Annotated[float | None, positive("of the motion; default 1 Hz", unit="rad/s",
         example="0.5 Hz")] = None
+    ramp_s: Annotated[float | None, not_negative("rise and fall of a trapezoid, each; 0 is a sine, the "
+        "default but for a speed drive: twice the time that its acceleration takes", high=1e6,
+        example="0.2 s")] = None
     load_Nm: Annotated[float | None, quantity("load torque, all the time; default the largest of "
-        "validation.loads", example="4 N*m")] = None
+        "validation.loads, against a speed drive", example="4 N*m")] = None
     share: Annotated[float | None, positive("share of the time in motion; default 1", high=1.0,
         example="0.4")] = None
     cycle_s: Annotated[float | None, positive("one motion and one rest together; default 10 s", high=1e6,

@@ -362,7 +362,7 @@ def ampere_unit(path: str, unit: str, constants: str) -> str:
     >>> ampere_unit("limits.peak_current", "A", "rms-line"), ampere_unit("limits.peak_current", "A", "dc")
     ('A dc', 'A')
     """
-    several = constants != "dc" and path.startswith(("limits.", "control."))
+    several = constants != "dc" and path.startswith(("limits.", "control.", "duty."))
     return _AMPERE.sub("A dc", unit) if several else unit
 
 

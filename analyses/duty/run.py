@@ -3,16 +3,18 @@
 from bisect import bisect_left
 from dataclasses import dataclass, replace
 from functools import cached_property
-from math import exp, inf, isfinite, log
+from math import exp, inf, isfinite, log, sqrt
 
 import numpy as np
 
 from actuator_lti.asked.verdict import Tally, Verdict
 from actuator_lti.design.loader import AnyDesign, as_design
 from actuator_lti.design.model import Design
+from actuator_lti.drive.steady import winding
 from actuator_lti.errors import InputError, instance_of
 from actuator_lti.types import Floats
 from analyses.duty.asked import Asked
+from analyses.failures.cases import jammed
 from analyses.specification.requirements import RequirementVerdict, judged_by, tally
 from nonlinear import Trajectory, commands, simulate
 
@@ -51,12 +53,36 @@ class Duty:
     peak_A: float
     continuous_A: float  # what the design allows for ever; inf where it states none
     limited: tuple[str, ...]  # limiters that act in steady motion: the duty is then not followed as asked
+    shaft_W: float  # mean over the cycle of what the motor gives its shaft
+    # Largest from the supply into the winding and back, of copper and shaft; in motion
+    peak_power_W: float
+    fed_back_W: float
     # One period of the steady motion
     time_s: Floats
     current_A: Floats
     # None without overload protection, without a thermal resistance in the design
     overload: Overload | None
     heating: Heating | None
+
+    @property
+    def rms_torque_Nm(self) -> float:
+        """Of the motor, over the cycle."""
+        return float(winding(self.design.effective_motor)[1] * self.rms_A)
+
+    @property
+    def peak_torque_Nm(self) -> float:
+        """Of the motor."""
+        return float(winding(self.design.effective_motor)[1] * self.peak_A)
+
+    @property
+    def copper_W(self) -> float:
+        """Mean over the cycle of what the winding takes, at the temperature that the design states."""
+        return float(winding(self.design.effective_motor)[0] * self.rms_A**2)
+
+    @property
+    def mean_power_W(self) -> float:
+        """Mean over the cycle of what the supply gives the motor: copper and shaft."""
+        return self.copper_W + self.shaft_W
 
     @cached_property
     def requirements(self) -> tuple[RequirementVerdict, ...]:
@@ -80,7 +106,7 @@ class Duty:
         return Verdict.of(all(stated) if stated else None)
 
 
-PERIODS = 3  # of the sine that pass before one is taken
+PERIODS = 3  # of the motion that pass before one is taken
 HOLD_S = 1.0
 MOST_TICKS = 2_000_000
 MOST_CYCLES = 2**40
@@ -90,9 +116,10 @@ _DRAWN = 200
 def duty(design: AnyDesign, asked: Asked | None = None) -> Duty:
     """Current of a duty by simulation, against continuous current, overload protection and temperature.
 
-    The protection is left out of the simulation, so that the current is that of the duty as asked.
+    The protection is left out of the simulation, so that the current is that of the duty as asked; the output
+    of a drive that is commanded in current is held.
 
-    Raises `InputError`: for a drive without motor current or position loop, or a period of too many ticks.
+    Raises `InputError`: for a drive without motor current or without a loop, or a period of too many ticks.
 
     >>> from actuator_lti.design import load_design
     >>> result = duty(load_design("joint"))
@@ -102,40 +129,52 @@ def duty(design: AnyDesign, asked: Asked | None = None) -> Duty:
     design = as_design(design)
     if not design.motor.has_electrical_dynamics:
         raise InputError("duty: an ideal torque source has no current")
-    if design.controller.position is None:
-        raise InputError("duty: needs a drive with a position loop")
+    if not design.controller.stages:
+        raise InputError("duty: needs a drive with a loop")
     asked = Asked.of(design) if asked is None else asked
     instance_of("asked", asked, Asked)
-    free = replace(design, limits=replace(design.limits, peak_time_s=None))
+    there = jammed(design) if design.controller.outermost == "current" else design
+    free = replace(there, limits=replace(design.limits, peak_time_s=None))
     run, ticks = _moving(free, asked)
     current, still = run.current_A[-ticks:], np.zeros(1)
     if asked.share < 1.0:
         resting = simulate(free, commands.hold(), HOLD_S, asked.load_Nm).current_A
         still = resting[resting.size // 2 :]
     periods, more = divmod(_moving_ticks(asked, design.controller.period_s, ticks), ticks)
-    squares = periods * np.sum(current**2) + np.sum(current[:more] ** 2)
-    moving, held = float(np.sqrt(squares / (periods * ticks + more))), float(np.sqrt(np.mean(still**2)))
+
+    def mean(values: Floats) -> float:
+        return float((periods * np.sum(values) + np.sum(values[:more])) / (periods * ticks + more))
+
+    moving, held = sqrt(mean(current**2)), float(np.sqrt(np.mean(still**2)))
+    R, _, kE = winding(design.effective_motor)
+    shaft = kE * current * run.motor_speed_rad_s[-ticks:]
+    power = R * current**2 + shaft
     peak = max(float(np.abs(part).max()) for part in (current, still))
     rms = float(np.sqrt(asked.share * moving**2 + (1.0 - asked.share) * held**2))
     acts = [name for name in run.limits if run.limit_active(name)[-ticks:].any()]
     return Duty(
         design, asked, rms, moving, held, peak,
         design.limits.continuous_current_A, tuple(acts),
+        asked.share * mean(shaft), float(power.max()), max(0.0, -float(power.min())),
         run.time_s[:ticks].copy(), current.copy(),
         _overload(design, asked, current, held), heating(design, rms),
     )  # fmt: skip
 
 
 def _moving(design: Design, asked: Asked) -> tuple[Trajectory, int]:
-    """The sine until it is steady, and the ticks of a period."""
-    Ts = design.controller.period_s
-    every = design.controller.position_loop.every
+    """The motion until it is steady, and the ticks of a period."""
+    Ts, size = design.controller.period_s, asked.size_of(design)
+    every = round(design.controller.period_of(design.controller.outermost) / Ts)
     lowest = (PERIODS + 1) / (MOST_TICKS * Ts)
     if asked.frequency_hz < lowest:
         raise InputError(f"frequency {asked.frequency_hz:g} Hz: at least {lowest:.2g} Hz with this period")
     ticks = max(1, round(1.0 / (asked.frequency_hz * Ts * every))) * every
-    sine = commands.sine(asked.amplitude_rad, 1.0 / (ticks * Ts))
-    return simulate(design, sine, (PERIODS + 1) * ticks * Ts, asked.load_Nm), ticks
+    command, whole = commands.sine(size, 1.0 / (ticks * Ts)), (PERIODS + 1) * ticks
+    if asked.ramp_s > 0.0:
+        time = np.arange(0, whole, every)
+        ends = np.array([0.0, asked.ramp_s / Ts, ticks - asked.ramp_s / Ts, ticks])
+        command = commands.sampled(time * Ts, np.interp(time % ticks, ends, [0.0, size, size, 0.0]))
+    return simulate(design, command, whole * Ts, asked.load_Nm), ticks
 
 
 def _overload(design: Design, asked: Asked, current: Floats, held: float) -> Overload | None:

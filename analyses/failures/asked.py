@@ -20,10 +20,12 @@ class Asked:
     """Simulate jam, hard-over, open phase, frozen and lost sensor and an oscillatory command.
 
     Prints for each failure the time to a stated deflection and to the mechanical stop, the deflection until
-    the failure is detected, the largest current and the largest torque in the train. What is not given comes
-    from [failure] of the design. The exit status is 1 where a requirement on failures is not met.
+    the failure is detected (of a speed drive, which fails as it turns, the angle run on), the largest speed
+    and current, and the largest torque in the train. What is not given comes from [failure] of the design.
+    The exit status is 1 where a requirement on failures is not met.
 
-    Try: actuator-lti failures joint --stop "25 deg" --deflection "2 deg" --detection 0.05
+    Try: actuator-lti failures joint --stop "25 deg" --deflection "2 deg" --detection 0.05, or of a spindle
+    actuator-lti failures spindle.toml --speed "3000 rpm"
     """
 
     stop_rad: Annotated[
@@ -48,6 +50,14 @@ class Asked:
             kind="load",
         ),
     ] = 0.0
+    speed_rad_s: Annotated[
+        float,
+        Option(
+            'Speed at which a speed drive turns before, such as "300 rpm"; half its top speed.',
+            "SPEED",
+            kind="speed",
+        ),
+    ] = 0.0
 
     def __post_init__(self) -> None:
         """Refuse what cannot be answered."""
@@ -62,14 +72,25 @@ class Asked:
             raise InputError(f"detection {seen:g} s: must not be after {end:g} s, the end")
         if not isfinite(self.load_Nm):
             raise InputError(f"load {self.load_Nm}: must be finite")
+        if not 0.0 <= self.speed_rad_s < inf:
+            raise InputError(f"speed_rad_s = {self.speed_rad_s:.6g}: must be 0 or more, and finite")
 
     @classmethod
     def of(cls, design: Design, **chosen: float | None) -> Asked:
         """What is chosen; the rest from [failure] of the design; else its full deflection is the stop.
 
-        A drive without a position loop turns on: unless one is stated, its stop is infinitely far.
+        A drive without a position loop turns on: unless one is stated, its stop is infinitely far. A speed
+        drive turns at half its top speed.
         """
+        from analyses.large_signal.tones import full_command
+
         stated = vars(design.failure) if design.failure is not None else {}
         stop = inf if design.controller.position is None else design.validation.full_deflection_rad
-        made = given({"stop_rad": stop}, stated, chosen)
+        turns = design.controller.outermost == "velocity"
+        usual = {"stop_rad": stop, **({"speed_rad_s": 0.5 * full_command(design)} if turns else {})}
+        made = given(usual, stated, chosen)
+        if "speed_rad_s" in made and not turns:
+            raise InputError(
+                f"speed_rad_s = {made['speed_rad_s']:.6g}: allowed of a drive commanded in speed"
+            )
         return cls(**{"deflection_rad": NEAR_SHARE * made["stop_rad"], **made})

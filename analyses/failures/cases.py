@@ -12,14 +12,17 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 from actuator_lti.design.model import Command, Design, Instruments, LoadFriction
-from actuator_lti.drive.facts import held_moment_Nm, stall_torque_Nm
+from actuator_lti.drive.facts import held_moment_Nm, resonance_rad_s, stall_torque_Nm
+from actuator_lti.drive.operating import runs, straight
 from actuator_lti.drive.profile import profile_passes_rad_s
 from actuator_lti.drive.steady import motor_torque_Nm
 from actuator_lti.errors import InputError
 from actuator_lti.loops import assemble_loops
-from analyses.failures.asked import Asked
+from analyses.failures.asked import NEAR_SHARE, Asked
+from analyses.large_signal.tones import full_command
 from analyses.linear.loop_figures import all_loop_figures
 from nonlinear import Drive, State
+from nonlinear.runs.trajectory import COMMAND_UNITS
 
 Sensing = Callable[[State], State]
 Driving = Callable[[float, float], float]
@@ -66,6 +69,14 @@ class Rig:
         """Angle of the output at t_k."""
         rigid = self.design.coupling is None
         return self.plant.value("angle") / self.design.total_ratio if rigid else self.plant.value("output")
+
+    @property
+    def followed(self) -> float:
+        """What the command orders, at t_k: position or speed at the output, current, voltage."""
+        true, stage = self.measured(), self.design.controller.outermost
+        speed = true.motor_speed_rad_s / self.design.total_ratio
+        other = {"velocity": speed, "current": true.current_A, "voltage": true.voltage_V}
+        return other.get(stage, self.output_rad)
 
     def fail(self, broken: Design) -> None:
         """Go on with another plant from the same angles, speeds, current and voltage."""
@@ -115,7 +126,7 @@ class Case:
     words: str
     command: Course  # command over the time from the failure on (from the step on, where ``at_rad`` is given)
     broken: Callable[[Rig], None] = lambda _: None  # what is done to the rig
-    start_rad: float = 0.0  # where the drive holds before
+    start: float = 0.0  # command that the drive follows before
     # The failure happens on the way, when the output is this far from the start; ``None``: at once
     at_rad: float | None = None
     stops: bool = True  # whether the run ends at the stop
@@ -127,42 +138,91 @@ def cases_of(design: Design, asked: Asked) -> tuple[tuple[Case, ...], dict[str, 
     if design.motor.constants != "dc":
         more = "a DC equivalent has one winding; the pulsating torque of two phases left is not modelled"
         open_phase += f" ({more})"
+    W, stage = asked.speed_rad_s, design.controller.outermost
+    # Of a drive that turns either way: one overspeeds it, the other adds its back-EMF to the bus
+    over, ways = "the power stage puts the whole bus on the motor", (1.0, -1.0) if W else (1.0,)
+    over += ", either way" * (len(ways) > 1)
     made = (
-        Case("hard-over", "the power stage puts the whole bus on the motor", lambda _: 0.0, _hard_over),
-        Case("open-phase", open_phase, lambda _: 0.0, _open),
+        *(Case("hard-over", over, lambda _: W, partial(_hard_over, way=way), W) for way in ways),
+        Case("open-phase", open_phase, lambda _: W, _open, W),
     )
-    if design.controller.position is None:
-        return made, dict.fromkeys(_LOOP_CASES, "the drive has no position loop")
-    far, near, half = asked.stop_rad, asked.deflection_rad, 0.5 * asked.stop_rad
-    frozen = f"the position sensor freezes, the command steps by {_size(design, near)}"
-    lost = f"the position sensor reads zero while the drive holds {_size(design, half)}"
-
-    def jam(rig: Rig) -> None:
-        rig.fail(jammed(design))
-        rig.jammed = True
-
-    def sine(hz: float, where: str) -> Case:
-        words = f"a sine of {_size(design, near)} at {hz:.3g} Hz, {where}"
-        return Case(
-            "oscillatory-command", words, lambda t: near * math.sin(2.0 * math.pi * hz * t), stops=False
-        )
-
-    jams = "the output jams half-way through a step to the stop"
-    of_loop = (
-        Case("hard-over-command", "the command jumps to the stop", lambda _: far),
-        Case("jam", jams, lambda _: far, jam, at_rad=half, stops=False),
-        Case("frozen-sensor", frozen, lambda _: near, partial(_sense, lose=False)),
-        Case("lost-sensor", lost, lambda _: half, partial(_sense, lose=True), start_rad=half),
-        *(sine(*one) for one in _sines(design, near)),
-    )
-    return made + of_loop, {}
+    if stage == "voltage":
+        return made, dict.fromkeys(_LOOP_CASES, "the drive has no loop")
+    own = {"position": _of_position, "velocity": _of_speed, "current": _of_current}[stage](design, asked)
+    there = {case.name for case in own}
+    return made + own, {name: _MISSING[name] for name in _LOOP_CASES if name not in there}
 
 
 _LOOP_CASES = ("hard-over-command", "jam", "frozen-sensor", "lost-sensor", "oscillatory-command")
+_MISSING = {
+    "frozen-sensor": "a sensor that freezes there is a lost one",
+    "jam": "its command gives it no speed",
+    "oscillatory-command": "nothing resonates in a rigid train",
+}
 
 
-def _hard_over(rig: Rig) -> None:
-    rig.driving = lambda _, bus: bus
+def _of_position(design: Design, asked: Asked) -> tuple[Case, ...]:
+    far, near, half = asked.stop_rad, asked.deflection_rad, 0.5 * asked.stop_rad
+    frozen = f"the position sensor freezes, the command steps by {_size(design, near)}"
+    lost = f"the position sensor reads zero while the drive holds {_size(design, half)}"
+    jams = "the output jams half-way through a step to the stop"
+    return (
+        Case("hard-over-command", "the command jumps to the stop", lambda _: far),
+        Case("jam", jams, lambda _: far, _jam, at_rad=half, stops=False),
+        Case("frozen-sensor", frozen, lambda _: near, partial(_sense, zero=False)),
+        Case("lost-sensor", lost, lambda _: half, partial(_sense, zero=True), start=half),
+        *_swings(design, near),
+    )
+
+
+def _of_speed(design: Design, asked: Asked) -> tuple[Case, ...]:
+    W, far = asked.speed_rad_s, full_command(design)
+    over, turns = (
+        f"the command jumps to ±{_size(design, far)}",
+        f"while the drive turns at {_size(design, W)}",
+    )
+    energy = 0.5 * design.motor_side_inertia_kgm2 * (W * design.total_ratio) ** 2
+    jams = f"the output jams {turns}, {energy:.3g} J in what turns before the coupling"
+    if design.coupling is None:
+        jams = f"the output jams {turns}; the {energy:.3g} J that turn are no part of this torque"
+    return (
+        Case("hard-over-command", over, lambda _: far, start=W),
+        Case("hard-over-command", over, lambda _: -far, start=W),
+        Case("jam", jams, lambda _: W, _jam, start=W, stops=False),
+        Case("lost-sensor", f"the speed sensor stops counting {turns}", lambda _: W, _sense, start=W),
+        *_swings(design, NEAR_SHARE * far, W),
+    )
+
+
+def _of_current(design: Design, asked: Asked) -> tuple[Case, ...]:
+    far = full_command(design)
+    near = NEAR_SHARE * far
+    lost = f"the current sensor reads zero, the command steps by {_size(design, near)}"
+    return (
+        Case("hard-over-command", f"the command jumps to {_size(design, far)}", lambda _: far),
+        Case("lost-sensor", lost, lambda _: near, _sense),
+        *(_swings(design, near) if design.coupling is not None else ()),
+    )
+
+
+def _jam(rig: Rig) -> None:
+    rig.fail(jammed(rig.design))
+    rig.jammed = True
+
+
+def _swings(design: Design, size: float, around: float = 0.0) -> Iterator[Case]:
+    for hz, where in _sines(design, size):
+        words = f"a sine of {_size(design, size)} at {hz:.4g} Hz, {where}"
+        turn = 2.0 * math.pi * hz
+
+        def command(t: float, turn: float = turn) -> float:
+            return around + size * math.sin(turn * t)
+
+        yield Case("oscillatory-command", words, command, start=around, stops=False)
+
+
+def _hard_over(rig: Rig, *, way: float) -> None:
+    rig.driving = lambda _, bus: way * bus
 
 
 def jammed(design: Design) -> Design:
@@ -186,9 +246,13 @@ def _open(rig: Rig) -> None:
         rig.fail(replace(rig.design, motor=replace(motor, resistance_ohm=OPEN * motor.resistance_ohm)))
 
 
-def _sense(rig: Rig, *, lose: bool) -> None:
-    """Freeze the position loop's sensor, or let it read zero; a speed taken from it is zero."""
-    sensor, part = rig.design.controller.position_loop.sensor, 0.0 if lose else 1.0
+def _sense(rig: Rig, *, zero: bool = False) -> None:
+    """Freeze the outermost loop's sensor, or let it read zero; a speed taken from it is zero."""
+    stage = rig.design.controller.outermost
+    if stage == "current":
+        rig.sensing = lambda true: replace(true, current_A=0.0)
+        return
+    sensor, part = getattr(rig.design.controller, stage).sensor, 0.0 if zero else 1.0
     angle = part * getattr(rig.measured(), f"{sensor}_angle_rad")
     rig.sensing = lambda true: replace(true, **{f"{sensor}_angle_rad": angle, f"{sensor}_speed_rad_s": 0.0})
 
@@ -196,16 +260,22 @@ def _sense(rig: Rig, *, lose: bool) -> None:
 def _sines(design: Design, size: float) -> Iterator[tuple[float, str]]:
     """Frequencies in Hz at which the output may follow a sine of the command most, and in words which.
 
-    Resonance and bandwidth of the response to the command, as `margins` has them; where the profile of the
-    command cuts a sine of the size there, the highest that it lets pass.
+    Resonance and bandwidth of the response to the command, as `margins` has them, of a drive that turns
+    without what passes; where the profile of the command cuts a sine of the size there, the highest that it
+    lets pass. Of a torque the resonance of motor and load.
     """
-    band = all_loop_figures(assemble_loops(design), step=False)["position"].bandwidth
+    stage = design.controller.outermost
+    if stage == "current":
+        yield float(resonance_rad_s(design)) / (2.0 * math.pi), "the resonance of motor and load"
+        return
+    loops = assemble_loops(straight(design) if runs(design) else design)
+    band = all_loop_figures(loops, step=False)[stage].bandwidth
     if band is not None and band.resonance_hz:
         yield band.resonance_hz, "the resonance of its response"
     if band is not None and band.minus3db_hz is not None:
         highest, words = band.minus3db_hz, "its bandwidth"
     else:
-        period = design.controller.period_s * design.controller.position_loop.every
+        period = design.controller.period_of(stage)
         highest, words = 0.5 / period, "half its sampling frequency, as it has no bandwidth"
     yield highest, words
     if (passed := profile_passes_rad_s(design, size) / (2.0 * math.pi)) < highest:
@@ -213,4 +283,5 @@ def _sines(design: Design, size: float) -> Iterator[tuple[float, str]]:
 
 
 def _size(design: Design, value: float) -> str:
-    return f"{1e3 * value:.3g} mm" if design.axis == "linear" else f"{math.degrees(value):.3g}°"
+    unit, scale = COMMAND_UNITS[design.axis, design.controller.outermost]
+    return f"{scale * value:.3g} {unit}"

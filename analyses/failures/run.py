@@ -9,13 +9,14 @@ import numpy as np
 from actuator_lti.asked.verdict import Verdict
 from actuator_lti.design.loader import AnyDesign, as_design
 from actuator_lti.design.model import Design
+from actuator_lti.drive.operating import follows_angle, runs, straight
 from actuator_lti.errors import InputError, UnstableError, instance_of
 from actuator_lti.loops import assemble_loops
 from actuator_lti.loops.stiffness import compliance
 from actuator_lti.types import Floats
 from analyses.failures.asked import Asked
 from analyses.failures.cases import Case, Rig, cases_of
-from analyses.motion.settling import Settling, outcome
+from analyses.motion.settling import NOTICED, Settling, counted, outcome, settle
 from analyses.specification.capability import drive_figures
 from analyses.specification.requirements import RequirementVerdict, judged_by, tally
 
@@ -30,6 +31,7 @@ class FailureCase:
     # on a jam the motor's torque less the train's friction
     time_s: Floats
     deflection_rad: Floats
+    speed_rad_s: Floats
     current_A: Floats
     moment_Nm: Floats
     # To the deflection asked for and to the stop, either side; ``None``: not reached while watched
@@ -37,6 +39,7 @@ class FailureCase:
     to_stop_s: float | None
     at_detection_rad: float  # largest deflection until the failure is detected
     # Largest magnitudes
+    peak_speed_rad_s: float
     peak_current_A: float
     peak_moment_Nm: float
     protected_s: float | None  # when the overload protection (I2t) acts first
@@ -112,13 +115,14 @@ def failures(design: AnyDesign, asked: Asked | None = None) -> Failures:
         raise InputError(f"watched {asked.watched_s:g} s: at most {longest:g} s with this period")
     wait = ceil(_settling_s(design, asked) / design.controller.period_s)
     cases, left_out = cases_of(design, asked)
-    before = {start: outcome(design, asked.load_Nm, start) for start in sorted({c.start_rad for c in cases})}
+    before = {start: _before(design, asked.load_Nm, start) for start in sorted({c.start for c in cases})}
     settled = {start: Rig(design, asked.load_Nm) for start in before}
     for start, rig in settled.items():
-        _hold(rig, start, wait, MOST_TICKS if before[start].rest.comes_to_rest else wait)
+        stays = before[start].rest.comes_to_rest and not (runs(design) and follows_angle(design))
+        _hold(rig, start, wait, MOST_TICKS if stays else wait)
     made = dict[str, FailureCase]()
     for case in cases:
-        rig = settled[case.start_rad].copy()
+        rig = settled[case.start].copy()
         if _reaches(rig, case):
             one = _followed(rig, asked, case)
             made[case.name] = _worse(made.get(case.name, one), one)
@@ -127,36 +131,47 @@ def failures(design: AnyDesign, asked: Asked | None = None) -> Failures:
     return Failures(design, asked, tuple(made.values()), left_out, tuple(before.values()))
 
 
+def _before(design: Design, load_Nm: float, start: float) -> Settling:
+    """What holding a start ends in; a drive that turns is asked without what passes as it turns."""
+    if not runs(design):
+        return outcome(design, load_Nm, start)
+    one = settle(straight(design), load_Nm, start)
+    return replace(one, rest=counted(one.rest, SETTLED / NOTICED * start))
+
+
 def _worse(first: FailureCase, second: FailureCase) -> FailureCase:
     """That of the larger deflection until detection, with the larger peaks of both."""
     taken = max(first, second, key=lambda each: each.at_detection_rad)
-    current = max(first.peak_current_A, second.peak_current_A)
-    moment = max(first.peak_moment_Nm, second.peak_moment_Nm)
-    return replace(taken, peak_current_A=current, peak_moment_Nm=moment)
+    peaks = ("peak_speed_rad_s", "peak_current_A", "peak_moment_Nm")
+    return replace(taken, **{name: max(getattr(first, name), getattr(second, name)) for name in peaks})
 
 
 def _hold(rig: Rig, start: float, wait: int, most: int) -> None:
-    """Hold a start until the output stays, over ``wait`` ticks, within `SETTLED` of what it moved in all."""
+    """Hold a start until what the command orders stays, over ``wait`` ticks, within `SETTLED` of its size."""
     for _ in range(0, most, wait):
         seen = list[float]()
         for _ in range(wait):
             rig.step(start)
-            seen.append(rig.output_rad)
+            seen.append(rig.followed)
         if np.ptp(seen) <= SETTLED * abs(seen[-1]):
             return
 
 
 def _settling_s(design: Design, asked: Asked) -> float:
-    """Time to reach half the stop and settle."""
-    # A load torque that does not reach the motor shows none of the poles by which the command is followed
-    followed, period = assemble_loops(design).plain_response, design.controller.period_s
+    """Time to reach half the stop, or the speed before, and settle."""
+    # A load torque that does not reach the motor shows none of the poles by which the command is followed;
+    # what passes as a drive turns makes none unstable
+    there = design if design.controller.position is not None else straight(design)
+    followed, period = assemble_loops(there).plain_response, design.controller.period_s
     updates = [] if followed is None else np.abs(followed.poles()) ** (period / followed.dt)
-    slowest = max(float(compliance(design).slowest), *updates)
+    slowest = max(float(compliance(there).slowest), *updates)
     if slowest > 1.0 + 1e-9:
         raise UnstableError("failures: the closed loop is not stable")
-    rate = min(drive_figures(design).output_rate_rad_s, design.command.rate_rad_s)
-    travel = 0.5 * asked.stop_rad / rate if rate > 0.0 else LONGEST_S
-    travel = 0.0 if design.controller.position is None else travel  # it is not commanded to
+    figures = drive_figures(design)
+    rate, way = min(figures.output_rate_rad_s, design.command.rate_rad_s), 0.5 * asked.stop_rad
+    if design.controller.position is None:
+        rate, way = figures.acceleration_rad_s2, asked.speed_rad_s
+    travel = way / rate if rate > 0.0 else LONGEST_S
     ticks = log(SETTLED) / log(slowest) if 0.0 < slowest < 1.0 else 0.0
     return min(0.1 + travel + ticks * period, MOST_TICKS * period)
 
@@ -169,10 +184,11 @@ def _followed(rig: Rig, asked: Asked, case: Case) -> FailureCase:
     for k in range(ceil(asked.watched_s / Ts) + 1):
         moved = rig.output_rad - start
         true = rig.step(case.command(k * Ts))
-        rows.append((k * Ts, moved, true.current_A, rig.moment_Nm, rig.controller.value("overloaded")))
+        overloaded = rig.controller.value("overloaded")
+        rows.append((k * Ts, moved, true.output_speed_rad_s, true.current_A, rig.moment_Nm, overloaded))
         if case.stops and abs(moved) >= asked.stop_rad:
             break
-    t, free, current, moment, overloaded = np.array(rows).T
+    t, free, speed, current, moment, overloaded = np.array(rows).T
     moved = np.clip(free, -asked.stop_rad, asked.stop_rad)  # the stop is hard, a tick goes past it
     protected = t[overloaded > 0.0]
     return FailureCase(
@@ -180,11 +196,13 @@ def _followed(rig: Rig, asked: Asked, case: Case) -> FailureCase:
         words=case.words,
         time_s=t,
         deflection_rad=moved,
+        speed_rad_s=speed,
         current_A=current,
         moment_Nm=moment,
         to_deflection_s=_first(t, np.abs(free), asked.deflection_rad),
         to_stop_s=_first(t, np.abs(free), asked.stop_rad),
         at_detection_rad=float(np.abs(moved)[t <= asked.detection_s * (1.0 + 1e-12)].max()),
+        peak_speed_rad_s=float(np.abs(speed).max()),
         peak_current_A=float(np.abs(current).max()),
         peak_moment_Nm=float(np.abs(moment).max()),
         protected_s=float(protected[0]) if protected.size else None,

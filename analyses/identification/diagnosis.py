@@ -151,7 +151,7 @@ def _drift(part: RecordFit, model: JointModel, offset: Parameter) -> tuple[list[
     """Whether scale or offset of all torques drifts (-1 to 1) along a record, and adds to the covariance."""
     moved = np.zeros_like(model.covariance)
     time, w = np.linspace(-1.0, 1.0, len(part.keep))[part.keep][part.compared], part.w[part.compared]
-    every = np.column_stack([w, *kept_columns(model, part, part.compared)])
+    every = np.column_stack([w, *(each[part.compared] for each in kept_columns(model, part))])
     every = every[:, independent(every)]
     table = np.column_stack([every, time * (w @ model.values), time])
     if len(table) <= table.shape[1] or len(independent(table)) < table.shape[1]:

@@ -112,6 +112,12 @@ class Rows:
     step_s: float = field(repr=False)  # from row to row
     keep: Mask = field(repr=False)  # which of all rows are used
     recipe: Recipe = field(repr=False)
+    # what the rows have of a torque at each of them; None: itself
+    answer: Callable[[Floats], Floats] | None = field(default=None, repr=False)
+
+    def answered(self, torque: Floats) -> Floats:
+        """What the rows have of a torque at each of them: itself, or what it makes of a run-down."""
+        return torque if self.answer is None else self.answer(torque)
 
     @property
     def rows_used(self) -> int:

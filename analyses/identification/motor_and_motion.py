@@ -30,6 +30,7 @@ from analyses.identification.inverse import fit_records
 from analyses.identification.joint_model import NAMES, FrictionForm, JointModel, Recipe
 from analyses.identification.motion_noise import with_noise_of_motion
 from analyses.identification.own_bias import without_bias
+from analyses.identification.run_down import fit_run_downs, runs_down
 from analyses.records.record import HELD, SMOOTH, Record
 
 Both = tuple[Sequence[Record], Sequence[Record]]  # records as taken, and simulated
@@ -267,6 +268,8 @@ def _fitted(
     both: Fit | None = None,
 ) -> JointModel:
     """The joint model as the settings ask, less its own bias, or with what was found with the motor."""
+    if all(runs_down(start, record) for record in records):
+        return fit_run_downs(start, records, settings.friction, held)
     weights = None if both is None else np.ones(len(records))
     model = _raw(start, settings, held, recipe, records, weights)
     parts = []

@@ -19,6 +19,7 @@ from analyses.estimation.least_squares import correlated_covariance
 from analyses.estimation.parameters import default_value
 from analyses.identification.joint_model import FrictionForm
 from analyses.identification.rows import record_rows
+from analyses.identification.run_down import decay_of, runs_down
 from analyses.records.record import Record
 
 STEP = 1e-3
@@ -227,6 +228,12 @@ def resimulate(design: Design, record: Record, form: FrictionForm) -> Resimulate
             )
         except InputError as refusal:  # a part that the simulator does not have
             why = f" ({refusal.message})"
+    if runs_down(design, record):
+        error = decay_of(design, record, found=False).relative_error
+        how = "the decay of its motion"
+        return Resimulated(
+            record=record.name, signal="motion", relative_error=error, beyond_noise=error, how=how
+        )
     knots = [point.speed_rad_s for point in design.friction.map(1)] or None
     rows = record_rows(design, record, form, None, knots_rad_s=knots)
     rest = rows.y - rows.explained({name: default_value(design, name) for name in rows.names}, rows.names)

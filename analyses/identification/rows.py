@@ -122,10 +122,10 @@ def stands(design: Design, record: Record, recipe: Recipe | None = None) -> bool
         moved = place[1] - place[1][0]  # exactly zero of a constant angle
         values = moved - moved.mean()
     recipe = recipe or recipe_for(record)
-    return _is_white(values, record, recipe) or _is_unmoved(design, record, recipe)
+    return is_white(values, record, recipe) or _is_unmoved(design, record, recipe)
 
 
-def _is_white(values: Floats, record: Record, recipe: Recipe) -> bool:
+def is_white(values: Floats, record: Record, recipe: Recipe) -> bool:
     """Whether a signal has as much power above the cut-off as below it, line by line.
 
     By the F-test of the two mean powers, of which each line of white noise is chi-square of two degrees.
@@ -147,7 +147,7 @@ def _is_unmoved(design: Design, record: Record, recipe: Recipe) -> bool:
     """
     try:
         drive = drive_of(design, record)[0]
-        if _is_white(drive, record, recipe):
+        if is_white(drive, record, recipe):
             return False
         rows = record_rows(design, record, "symmetric", recipe)
         found = solve(rows.columns(NAMES["symmetric"]), rows.y)

@@ -277,3 +277,9 @@ def full_range(design: Design) -> dict[str, float]:
         gain = 1.0 if place is None or place.gain == 0.0 else place.gain
         speed = design.validation.full_deflection_rad * design.total_ratio * gain
     return {"position": design.validation.full_deflection_rad, "velocity": speed, "current": current}
+
+
+def full_command(design: Design) -> float:
+    """The largest command of the outermost loop: at the output a full deflection or a speed, a current."""
+    stage, full = design.controller.outermost, {**full_range(design), "voltage": design.limits.voltage_V}
+    return full[stage] / (design.total_ratio if stage == "velocity" else 1.0)

@@ -12,7 +12,7 @@ from actuator_lti.design.checks import CHECKS
 from actuator_lti.design.model import Design, Requirement, Waiver
 from actuator_lti.files.reading import Tree
 from actuator_lti.loops import Loops
-from analyses.large_signal.tones import TANH_TOLERANCE
+from analyses.large_signal.tones import TANH_TOLERANCE, full_command
 from analyses.limit_cycles.stick_slip import stick_slip_cycle
 from nonlinear.rows import Rows
 from nonlinear.runs.trajectory import COMMAND_UNITS, Trajectory
@@ -82,7 +82,7 @@ def step_rows(design: Design, load_Nm: float, step_rad: float, *, limits_on: boo
 def outcome(design: Design, load_Nm: float, step_rad: float) -> Settling:
     """What a step ends in as it counts: `settle`, and swings that are too small are rest."""
     one = settle(design, load_Nm, step_rad)
-    return replace(one, rest=counted(one.rest, design.validation.full_deflection_rad))
+    return replace(one, rest=counted(one.rest, full_command(design)))
 
 
 def settlings_of(
@@ -129,7 +129,7 @@ def noticed(design: Design, settlings: Iterable[Settling]) -> Settling | None:
 
     One that fails comes first, then one that is not known, then one that a requirement accepts.
     """
-    least = NOTICED * design.validation.full_deflection_rad
+    least = NOTICED * full_command(design)
     hunting = [one for one in settlings if one.hunting and one.swing_rad >= least]
     order = (Verdict.MET, Verdict.NOT_PROVEN, Verdict.NOT_MET)
     return max(hunting, key=lambda one: (order.index(verdict_of(design, one)), one.swing_rad), default=None)

@@ -9,6 +9,7 @@ import numpy as np
 from actuator_lti.errors import InputError
 from actuator_lti.types import Floats
 from analyses.estimation.means import best_lag, correlation_time
+from analyses.estimation.smoothing import without_noise
 from analyses.records.campaign_file import Method
 from analyses.records.factors import named_factor
 from analyses.records.record import Record
@@ -179,6 +180,7 @@ def _by_correlation(a: Series, b: Series, where: str) -> ClockJoin:
     """
     step = max(np.ptp(a.time_s), np.ptp(b.time_s)) / GRID
     a, b = _gridded(a, step), _gridded(b, step)
+    b = b._replace(values=without_noise(b.values))  # its noise has slopes, which tell no time
     if any(np.std(one.values) <= 1e-12 * np.max(np.abs(one.values)) for one in (a, b)):
         raise InputError("a flat signal cannot be aligned by correlation", where=where)
     lag = best_lag(a.values - a.values.mean(), b.values - b.values.mean())

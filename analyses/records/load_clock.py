@@ -3,12 +3,14 @@
 from dataclasses import replace
 
 import numpy as np
+from numpy.polynomial.legendre import legvander
 from scipy.signal import correlate
 from scipy.stats import chi2
 
 from actuator_lti.errors import InputError
 from actuator_lti.types import Floats
 from analyses.estimation.means import correlation_time
+from analyses.estimation.smoothing import minus_likelihood, slow_shares, without_noise
 from analyses.records.clocks import ClockJoin
 from analyses.records.consistency import NO_CHANCE, SURE
 from analyses.records.record import Record
@@ -16,7 +18,7 @@ from analyses.records.steady_window import CRITERION, find_steady_window
 
 GRID = 40_000  # points over the longer record, at most
 ROUNDING = 1e-9
-DRIFT = 3  # degree of the polynomial that a slow drift of the current (warming) is taken for
+ORDERS = 64  # polynomials over the steady time: what bends faster than a quarter of them is noise
 
 
 def by_current(drive: Record, sensor: Record, join: ClockJoin, signal: str) -> ClockJoin:
@@ -39,7 +41,9 @@ def by_current(drive: Record, sensor: Record, join: ClockJoin, signal: str) -> C
     time = np.arange(own.time_s[0], own.time_s[-1], period)
     grid = np.arange(sensor_s[0] - half, sensor_s[-1] + half, period)
     current = np.interp(time, own.time_s, own["current"])
-    load = np.interp(grid, sensor_s, np.abs(sensor[signal]))  # outside its record as at its ends
+    even = np.linspace(sensor_s[0], sensor_s[-1], len(sensor_s))
+    load = without_noise(np.interp(even, sensor_s, np.abs(sensor[signal])))
+    load = np.interp(grid, even, load)  # outside its record as at its ends
     if not np.ptp(current) * np.ptp(load):
         return join
     offsets = time[0] - grid[: len(load) - len(current) + 1]
@@ -66,21 +70,28 @@ def by_current(drive: Record, sensor: Record, join: ClockJoin, signal: str) -> C
 def _against_the_best(current: Floats, load: Floats) -> tuple[Floats, float]:
     """Minus twice the log likelihood of the current at each place of the load, less the least; correlation.
 
-    Drift and load are fitted together; a share of the load below zero is none.
+    A share of the load below zero is none. Beside it stand a constant and a slow drift, each polynomial with
+    its share (`slow_shares`); rows count by the correlation in time of what is left by the likeliest.
     Shapes (n,) and (m,), m > n; the ratios have shape (m - n + 1,).
     """
-    n, load = len(current), load - load.mean()
-    drift = np.linalg.qr(np.vander(np.linspace(-1.0, 1.0, n), DRIFT + 1))[0]
-    current = current - drift @ (current @ drift)
-    squares = np.concatenate([[0.0], np.cumsum(load**2)])
-    power = squares[n:] - squares[:-n]
-    for column in drift.T:
-        power = power - correlate(load, column, mode="valid", method="fft") ** 2
-    shared = np.maximum(correlate(load, current, mode="valid", method="fft"), 0.0)
-    told = np.divide(shared**2, power, out=np.zeros_like(power), where=power > ROUNDING * squares[-1])
-    total = float(current @ current)
-    left = np.maximum(total - told, ROUNDING * total)
-    best = int(np.argmin(left))
-    part = load[best : best + n]
-    rest = current - (part - drift @ (part @ drift)) * (shared[best] / max(power[best], 1e-300))
-    return n / correlation_time(rest) * np.log(left / left[best]), float(np.sqrt(1.0 - left[best] / total))
+    n, load, total = len(current), load - load.mean(), float(current @ current)
+    waves = np.linalg.qr(legvander(np.linspace(-1.0, 1.0, n), min(ORDERS, n) - 1))[0].T
+    drift, squares, own = (
+        slow_shares(len(waves)),
+        np.concatenate([[0.0], np.cumsum(load**2)]),
+        waves @ current,
+    )
+    placed = np.array([correlate(load, one, mode="valid", method="fft") for one in [*waves, current]])
+    power = squares[n:] - squares[:-n] - drift @ placed[:-1] ** 2
+    beside = np.maximum(placed[-1] - (drift * own) @ placed[:-1], 0.0)
+    seen = power > ROUNDING * squares[-1]
+    told = np.divide(beside, power, out=np.zeros_like(power), where=seen)
+    alone = total - drift @ own**2
+    left, worth = np.maximum(alone[:, None] - told * beside, ROUNDING * total), float(n)
+    for _ in range(2):
+        minus = minus_likelihood(left, drift, worth)
+        cut, best = np.unravel_index(np.argmin(minus), minus.shape)
+        rest = current - told[cut, best] * load[best : best + n]
+        worth = n / correlation_time(rest - (drift[cut] * (waves @ rest)) @ waves)
+    ratio = np.min(minus, axis=0) - minus[cut, best]
+    return ratio, float(np.sqrt(1.0 - left[cut, best] / alone[cut]))

@@ -1,12 +1,13 @@
 """Figures that only an analysis of one design finds: failures, duty, limit cycles, corners, command."""
 
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import lru_cache
 from math import inf, log10, pi
+from typing import Any
 
 import numpy as np
 
-from actuator_lti.asked.quantities import ANALYSIS_QUANTITIES
+from actuator_lti.asked.quantities import ANALYSIS_QUANTITIES, QUANTITIES
 from actuator_lti.design.model import Design
 from actuator_lti.drive.profile import profile_onset_rad
 from actuator_lti.errors import InputError
@@ -48,19 +49,38 @@ def said_of(design: Design, frequency_hz: float | None) -> str:
     return said + f"{20.0 * log10(gain) if gain else -inf:.3g} dB, {100.0 * share:.0f} % of the time limited"
 
 
+_ANSWERS = {"failures": failures, "duty": duty, "cycles": limit_cycles, "corners": corners}
+
+
+def answer_of(design: Design, analysis: str) -> Any:
+    """What ``failures``, ``duty``, ``cycles`` or ``corners`` finds, asked by default.
+
+    Computed once for all who ask of a design in turn: its requirements, corners, the sections of a report.
+    """
+    if analysis == "corners":
+        return _answered(design, analysis)
+    own = tuple(one for one in design.requirements if one.quantity in ANALYSIS_QUANTITIES)
+    alone = replace(design, requirements=tuple(one for one in own if not QUANTITIES[one.quantity].cornered))
+    return replace(_answered(alone, analysis), design=design)  # what else is required changes no figure
+
+
+@lru_cache(maxsize=len(_ANSWERS))
+def _answered(design: Design, analysis: str) -> Any:
+    return _ANSWERS[analysis](design)
+
+
 @dataclass(frozen=True)
 class AskedFigures:
-    """The figures of one design, each analysis run once and only where one of its figures is read.
+    """The figures of one design that an analysis finds; each is run only where one of its figures is read.
 
     Attributes are the readers of `actuator_lti.asked.quantities`; ``None``: the drive has no such figure.
     """
 
     design: Design
 
-    failures = cached_property(lambda self: failures(self.design))
-    duty = cached_property(lambda self: duty(self.design))
-    cycles = cached_property(lambda self: limit_cycles(self.design))
-    corners = cached_property(lambda self: corners(replace(self.design, requirements=())))
+    failures = property(lambda self: answer_of(self.design, "failures"))
+    duty = property(lambda self: answer_of(self.design, "duty"))
+    cycles = property(lambda self: answer_of(self.design, "cycles"))
 
     @property
     def limit_cycle_rad(self) -> float | None:
@@ -73,7 +93,7 @@ class AskedFigures:
         quantity = ANALYSIS_QUANTITIES[name]
         try:
             if quantity.cornered:
-                return worst_of(self.corners.corners, name), ""
+                return worst_of(answer_of(self.design, "corners").corners, name), ""
             value = quantity.read(self, self.design.axis)
         except InputError as error:
             return None, error.message

@@ -5,14 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cache, lru_cache
+from functools import cache
 from itertools import compress
 from math import inf
 from types import SimpleNamespace
-from typing import TYPE_CHECKING
 
 from actuator_lti.asked.drive_figure import drive_figure
-from actuator_lti.asked.quantities import ANALYSIS_QUANTITIES, LOOPS, QUANTITIES, judged_loops, with_unit
+from actuator_lti.asked.quantities import LOOPS, QUANTITIES, judged_loops, with_unit
 from actuator_lti.asked.verdict import Role, Tally, Verdict
 from actuator_lti.design.asked import ResponseTo
 from actuator_lti.design.loader import AnyDesign, as_design
@@ -24,9 +23,6 @@ from actuator_lti.errors import InputError, instance_of
 from actuator_lti.loops import assemble_loops
 from actuator_lti.types import Progress
 from analyses.linear.loop_figures import HELD, LoopFigures, all_loop_figures
-
-if TYPE_CHECKING:
-    from analyses.specification.asked_figures import AskedFigures
 
 
 def evaluate_requirements(
@@ -43,9 +39,7 @@ def evaluate_requirements(
     if figures is None:
         figures = all_loop_figures(assemble_loops(design))
     instance_of("figures", figures, Mapping)
-    analysed = [one for one in design.requirements if one.quantity in ANALYSIS_QUANTITIES]
-    own = tuple(one for one in analysed if not QUANTITIES[one.quantity].cornered)
-    alone = replace(design, requirements=own)  # what else is required changes no figure
+    from analyses.specification.asked_figures import AskedFigures
 
     @cache
     def moving() -> LoopFigures | None:
@@ -56,17 +50,9 @@ def evaluate_requirements(
     for done, requirement in enumerate(design.requirements):
         if progress is not None:
             progress(done, len(design.requirements))
-        found = judged(design, requirement, figures, lambda name: _analyses_of(alone).figure(name))
+        found = judged(design, requirement, figures, AskedFigures(design).figure)
         made += [_with_limits(design, verdict, moving) for verdict in found]
     return tuple(made)
-
-
-@lru_cache(maxsize=1)
-def _analyses_of(design: Design) -> AskedFigures:
-    """The analyses of one design, kept for who asks next: in a report the corners, after the requirements."""
-    from analyses.specification.asked_figures import AskedFigures
-
-    return AskedFigures(design)
 
 
 def judged_nominally(

@@ -1,10 +1,12 @@
 """What the live page must know: places of the rows, limiters, how rows and figures follow from keys."""
 
 from collections.abc import Mapping
+from math import pi
 
 from actuator_lti.asked.drive_figure import drive_figure
 from actuator_lti.design.access import parameter_value
 from actuator_lti.design.model import Design
+from actuator_lti.drive.operating import turned
 from actuator_lti.drive.signals import Limiter
 from actuator_lti.drive.wiring import wire
 from actuator_lti.loops.limiters import limiter_places
@@ -29,6 +31,8 @@ SLOPES = tuple(
         (at.TORQUE_SLOPE, at.TORQUE_PEAK, at.TORQUE_ORDER, at.TORQUE_WAVES),
     )
 )
+AVERAGED = ((at.MOMENT_PEAK, at.MOMENT_ORDER + 1), (at.TORQUE_PEAK, at.TORQUE_ORDER + 1))
+"""Places of peak and phase of the first waves, which a motion averages: gear error, cogging."""
 EVERY_POSITION, EVERY_VELOCITY = at.EVERY_POSITION, at.EVERY_VELOCITY
 LIMITERS = tuple(zip(at.LIMITERS, at.LIMITER_BITS, strict=True))  # name, bit in the flags
 
@@ -44,6 +48,16 @@ def limits_seen(design: Design) -> list[tuple[str, int, int]]:
     """Words, place of the limit in the row and line of `limiter_sizes`, of each limiter of a drive."""
     lines = [(place.limiter, line_of(place.limiter)) for place in limiter_places(wire(design))]
     return [(item.words, at.LIMIT[item.name], line) for item, line in lines if line is not None]
+
+
+def turned_rows(design: Design) -> dict[str, list[tuple[int, float]]]:
+    """What a row holds, place by place, where `turned` puts the drive: phases on a crest and in a notch."""
+    put = (
+        [(phase, 0.0) for _, phase in AVERAGED],
+        [(phase, pi) for _, phase in AVERAGED],
+        [(peak, 0.0) for peak, _ in AVERAGED],
+    )
+    return {where: there for (where, _), there in zip(turned(design), put, strict=False)}
 
 
 def changes_row(design: Design, path: str) -> bool | None:

@@ -52,15 +52,17 @@ SetOption = Annotated[
 _AT_OUTPUT = {
     ("output", "rotary"): ("rad", 'a value such as "2 deg"'),
     ("output", "linear"): ("m", 'a value such as "5 mm"'),
+    ("speed", "rotary"): ("rad/s", 'a speed such as "300 rpm"'),
+    ("speed", "linear"): ("m/s", 'a speed such as "0.2 m/s"'),
     ("load", "rotary"): ("N*m", 'a torque such as "4 N*m"'),
     ("load", "linear"): ("N", 'a force such as "40 N"'),
 }
 
 
 def read_quantity(option: str, words: str | None, kind: Kind, drive: Design, unit: str = "") -> float | None:
-    """A number of the command line with its unit; but for a position of the output also without it.
+    """A number of the command line with its unit; but for what is at the output also without it.
 
-    In SI a position of the output or a load there, in its usual unit the outermost loop's command; the
+    In SI a position, speed or load at the output, in its usual unit the outermost loop's command; the
     drive's axis and outermost loop say the unit. A plain number is in ``unit``. ``option``: for the message.
     """
     from actuator_lti.design.units import parse_limit
@@ -68,7 +70,7 @@ def read_quantity(option: str, words: str | None, kind: Kind, drive: Design, uni
     if words is None:
         return None
     bare: float | None = None
-    if kind in ("output", "load"):
+    if kind in ("output", "speed", "load"):
         unit, allowed = _AT_OUTPUT[kind, drive.axis]
     else:
         if kind == "command":
@@ -77,7 +79,7 @@ def read_quantity(option: str, words: str | None, kind: Kind, drive: Design, uni
             unit, _ = COMMAND_UNITS[drive.axis, drive.controller.outermost]
         allowed = f'"5 {unit}", or 5 in {unit}' if unit else 'a number such as 0.5 or "50 %"'
     with suppress(ValueError):
-        bare = None if kind == "output" else float(words)
+        bare = None if kind in ("output", "speed") else float(words)
     if bare is not None and not isfinite(bare):
         raise InputError(f"{option} {words}: must be a finite number")
     try:

@@ -13,13 +13,12 @@ from actuator_lti.asked.quantities import (
     shown_unit,
 )
 from actuator_lti.design.model import Design, Requirement
-from actuator_lti.design.plant import reachable_speed
 from actuator_lti.drive.profile import command_mean
 from actuator_lti.drive.signals import LIMITERS
 from actuator_lti.errors import InputError
 from actuator_lti.files.reading import Tree
 from analyses.large_signal.classify import FRICTION_DB, FRICTION_DEG, STICK_FRACTION
-from analyses.large_signal.tones import LEAST_UPDATES
+from analyses.large_signal.tones import LEAST_UPDATES, full_command
 from analyses.linear.loop_figures import HELD
 from analyses.monte_carlo.judging import in_populations
 from nonlinear.export import linear, page
@@ -68,6 +67,7 @@ def live_model(design: Design, source: str | None = None) -> Tree:
         "points": POINTS,
         "point": _point(design),
         "slopes": page.SLOPES,
+        "turned": page.turned_rows(design),
         "held": HELD,
         "relations": [[statement.data for statement in check] for check in relations],
         "electrical": design.motor.has_electrical_dynamics,
@@ -140,18 +140,13 @@ def _judged(
 
 def _step(design: Design) -> Tree:
     """Give the command of the step (a tenth of the largest), and what it is a step of."""
-    linear_axis, limits, outermost = design.axis == "linear", design.limits, design.controller.outermost
+    linear_axis, full, outermost = design.axis == "linear", full_command(design), design.controller.outermost
     if outermost == "position":
         unit, factor = ("mm", 1e-3) if linear_axis else ("deg", math.pi / 180.0)
-        size = 0.1 * design.validation.full_deflection_rad
-        return {"size": size, "unit": unit, "factor": factor, "of": "output"}
+        return {"size": 0.1 * full, "unit": unit, "factor": factor, "of": "output"}
     if outermost == "velocity":
-        top = reachable_speed(design)
-        largest = top if math.isfinite(top) else 100.0
-        unit, size = "m/s" if linear_axis else "rad/s", 0.1 * largest / design.total_ratio
-        return {"size": size, "unit": unit, "factor": 1.0, "of": "speed"}
-    size = 0.1 * (limits.peak_current_A if math.isfinite(limits.peak_current_A) else 10.0)
-    return {"size": size, "unit": "A", "factor": 1.0, "of": "current"}
+        return {"size": 0.1 * full, "unit": "m/s" if linear_axis else "rad/s", "factor": 1.0, "of": "speed"}
+    return {"size": 0.1 * full if math.isfinite(full) else 1.0, "unit": "A", "factor": 1.0, "of": "current"}
 
 
 def _map(design: Design) -> Tree | None:

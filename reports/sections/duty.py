@@ -8,8 +8,9 @@ from actuator_lti.asked.verdict import Verdict
 from analyses.duty.run import Duty
 from reports import document as doc
 from reports.charts import style
+from reports.numbers import seconds
 from reports.sections import requirements
-from reports.sections.names import output_unit
+from reports.sections.names import command_unit, push_words
 
 _SHOWN = 400
 
@@ -48,8 +49,12 @@ _COLUMNS = [
 
 
 def asked_words(result: Duty) -> str:
-    asked = result.asked
-    words = f"±{output_unit(result.design.axis).of(asked.amplitude_rad)} at {asked.frequency_hz:.3g} Hz"
+    asked, size = result.asked, command_unit(result.design).of(result.asked.size_of(result.design))
+    words = f"±{size} at {asked.frequency_hz:.3g} Hz"
+    if asked.ramp_s > 0.0:
+        words = f"0 to {size} and back in {seconds(asked.ramp_s)} each, at {asked.frequency_hz:.3g} Hz"
+    if asked.current_A is not None:
+        words += ", the output held,"
     words += f" under {asked.load_Nm:.3g} {result.design.load_unit}"
     if asked.share < 1.0:
         words += f", {100.0 * asked.share:.3g} % of every {asked.cycle_s:.3g} s"
@@ -86,6 +91,16 @@ def _rows(result: Duty) -> list[doc.Row]:
     ]
     rows += [_row("current at rest, rms", result.holding_A, math.inf, "A")] * (result.asked.share < 1.0)
     rows.append({**_row("current, peak", result.peak_A, peak, "A"), "_status": None})
+    push, unit = push_words(result.design), result.design.load_unit
+    figures = (
+        (f"motor {push}, rms over time", result.rms_torque_Nm, unit),
+        (f"motor {push}, peak", result.peak_torque_Nm, unit),
+        ("copper loss, mean", result.copper_W, "W"),
+        ("power from the supply, mean", result.mean_power_W, "W"),
+        ("power from the supply, peak", result.peak_power_W, "W"),
+        ("power back to the supply, peak", result.fed_back_W, "W"),
+    )
+    rows += [_row(what, value, math.inf, unit) for what, value, unit in figures]
     if over is not None:
         rows.append(_row("overload state, peak", over.peak, 1.0, "", over.acts_after_s))
     if heat is not None:

@@ -12,7 +12,7 @@ from reports import document as doc
 from reports.charts import style
 from reports.numbers import seconds, short
 from reports.sections import requirements
-from reports.sections.names import Unit, output_unit, push_words
+from reports.sections.names import Unit, command_unit, output_unit, push_words
 
 NAMES = {
     "hard-over": "Hard-over of the power stage",
@@ -30,8 +30,10 @@ def section(result: Failures) -> doc.Section:
     out, asked, push = output_unit(result.design.axis), result.asked, push_words(result.design)
     swing, load = noticed(result.design, result.before), f"{asked.load_Nm:g} {result.design.load_unit}"
     held = "has come to rest"
+    if asked.speed_rad_s:
+        held = f"turns at a command of {out.per('s').of(asked.speed_rad_s)}"
     if swing is not None:
-        held = f"does not come to rest, {told(result.design, swing, *out)},"
+        held = f"{_unsteady(result)}, {told(result.design, swing, *command_unit(result.design))},"
     intro = (
         f"Each failure is simulated from a drive that {held} under {load} (positive pushes forward). "
         f"Deflection counts from where the output was; {_stop(result, out)}, and "
@@ -53,6 +55,15 @@ def section(result: Failures) -> doc.Section:
     return doc.section("failures", title, blocks, result=words, intro=intro, status=status, told=told_as)
 
 
+def _turns(result: Failures) -> bool:
+    """Whether the drive fails as it turns: then its speed is what to look at."""
+    return result.design.controller.outermost == "velocity"
+
+
+def _unsteady(result: Failures) -> str:
+    return f"does not {'become steady' if _turns(result) else 'come to rest'}"
+
+
 def _stop(result: Failures, out: Unit) -> str:
     stop = result.asked.stop_rad
     return f"the stop is {out.of(stop, 4)} away" if stop < inf else "no stop is stated"
@@ -70,10 +81,14 @@ def summary(result: Failures) -> str:
         size = f"{short(out.scale * worst.at_detection_rad, 3)} {out.unit}"
         words = f"moves the output most until it is detected: {size} in {when}"
         words += "" if reached is None else f"; it reaches the stop after {seconds(reached)}"
+    if _turns(result):
+        fastest = max(result.cases, key=lambda case: case.peak_speed_rad_s)
+        top = out.per("s").of(fastest.peak_speed_rad_s)
+        words += f"; the fastest is {NAMES[fastest.name].lower()}, {top}"
     swing = noticed(result.design, result.before)
     if swing is not None and verdict_of(result.design, swing) is not Verdict.MET:
-        does = f"does not come to rest under {result.asked.load_Nm:g} {result.design.load_unit}"
-        words += f"; before it the drive {does}: {told(result.design, swing, *out)}"
+        does = f"{_unsteady(result)} under {result.asked.load_Nm:g} {result.design.load_unit}"
+        words += f"; before it the drive {does}: {told(result.design, swing, *command_unit(result.design))}"
     return f"{NAMES[worst.name]} {words}. {requirements.told(result.requirements)}".rstrip()
 
 
@@ -91,6 +106,7 @@ def _table(result: Failures, out: Unit) -> doc.Block:
         doc.of(lambda case: NAMES[case.name], "case", "Failure"),
         *times,
         doc.of("at_detection_rad", "seen", "Until detected", **out.column(better=-1)),
+        doc.of("peak_speed_rad_s", "speed", "Peak speed", **out.per("s").column(better=-1)),
         doc.of(current, "current", "Peak current", "A", **most),
         doc.of("peak_moment_Nm", "moment", f"Peak {push}", load, **most),
         doc.of("protected_s", "protected", "I²t acts at", **time),
@@ -112,9 +128,10 @@ def _figure(result: Failures, out: Unit) -> doc.Block:
     for k, (case, count) in enumerate(zip(shown, counts, strict=True)):
         keep = np.unique(np.linspace(0, count - 1, min(count, _SHOWN)).astype(int))
         time = case.time_s[keep] * per_s
-        top.curve(time, out.scale * case.deflection_rad[keep], NAMES[case.name], **style.series(k))
+        course = case.speed_rad_s if _turns(result) else case.deflection_rad
+        top.curve(time, out.scale * course[keep], NAMES[case.name], **style.series(k))
         bottom.curve(time, case.moment_Nm[keep], NAMES[case.name], **style.series(k))
-    if asked.stop_rad < inf:
+    if asked.stop_rad < inf and not _turns(result):
         top.rule_y(out.scale * asked.stop_rad, "stop", seen=True, colour=style.RED, dash=1)
     for panel in (top, bottom):
         panel.rule_x(asked.detection_s * per_s, "detected" if panel is top else "")
@@ -122,4 +139,6 @@ def _figure(result: Failures, out: Unit) -> doc.Block:
     top.y.label, bottom.y.label = f"deflection, {out.unit}", f"{push}, {result.design.load_unit}"
     bottom.x.limits(0.0, last * per_s)
     both = f"Deflection of the output and {push}"
+    if _turns(result):
+        top.y.label, both = f"speed, {out.per('s').unit}", f"Speed of the output and {push}"
     return doc.figure("failures", chart, f"{both} in the train after each failure but the oscillation.")

@@ -85,12 +85,18 @@ def _intro(result: BenchResult) -> str:
     ends = any(recipe.part(len(record)).stop < len(record) for record in result.records)
     last = f" and last {recipe.skip_end_samples}" if ends else ""
     filtered = "Position and torques" if recipe.both_sides else "Position"
-    return (
-        f"{many}{model.rows_in} rows in, {model.rows_used} used. {filtered} filtered at {recipe.cutoff_hz:g} "
+    how = (
+        f"{filtered} filtered at {recipe.cutoff_hz:g} "
         f"Hz (Butterworth of order {recipe.filter_order}, forward and backward), differentiated twice, the "
         f"first {recipe.skip_samples}{last} samples dropped, decimated by "
         f"{recipe.decimation}{f', {rest} rows at rest left out' if rest else ''}; inverse dynamic model by "
-        f"least squares. Relative residual {100.0 * model.relative_residual:.4f} %, fit "
+        "least squares"
+    )
+    if all(part.answer for part in model.records):
+        how = "A run-down: the decay by viscous and dry friction over time, by least squares"
+    return (
+        f"{many}{model.rows_in} rows in, {model.rows_used} used. {how}. "
+        f"Relative residual {100.0 * model.relative_residual:.4f} %, fit "
         f"{min(part.fit_percent for part in model.records):.2f} % (100 (1 - |y - yhat| / |y - mean(y)|)"
         f"{', the lowest' if many else ''})."
     )

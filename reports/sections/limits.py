@@ -15,14 +15,13 @@ from actuator_lti.drive.signals import LIMITERS
 from actuator_lti.loops.limiters import Onset
 from analyses.large_signal.classify import CAUSES, WAVEFORMS
 from analyses.large_signal.result import LargeSignals
-from nonlinear.runs.trajectory import COMMAND_UNITS
 from reports import document as doc
 from reports.charts import style
-from reports.sections.names import Unit, hertz
+from reports.sections.names import Unit, command_unit, hertz
 
 
 def section(design: Design, border: Onset) -> doc.Section:
-    unit, scale = COMMAND_UNITS[design.axis, design.controller.outermost]
+    scale, unit = command_unit(design)
     where = ", at the output," if design.controller.outermost in ("position", "velocity") else ""
     caption = (
         f"Peak amplitude of a sine command{where} at which each limit is just reached. Below the "

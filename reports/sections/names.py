@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 from actuator_lti.asked.quantities import QUANTITIES as REGISTRY
 from actuator_lti.asked.quantities import shown_unit
 from actuator_lti.design.model import Design
+from nonlinear.runs.trajectory import COMMAND_UNITS
 from reports import document as doc
 
 LOOPS = {"current": "Current loop", "velocity": "Velocity loop", "position": "Position loop"}
@@ -52,6 +53,12 @@ class Unit(NamedTuple):
 def output_unit(axis: str) -> Unit:
     """Unit of a position at the output: degrees, or millimetres on a linear axis."""
     return Unit(1e3, "mm") if axis == "linear" else Unit(math.degrees(1.0), "deg")
+
+
+def command_unit(design: Design) -> Unit:
+    """Unit of a command: a position or speed at the output, a current, a voltage."""
+    unit, scale = COMMAND_UNITS[design.axis, design.controller.outermost]
+    return Unit(scale, unit)
 
 
 def fine_unit(axis: str) -> Unit:

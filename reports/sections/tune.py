@@ -10,10 +10,9 @@ from actuator_lti.design.model import Design
 from actuator_lti.design.writing import write_changed
 from actuator_lti.files.atomic import write_text
 from analyses.tuning.result import BindingRequirement, TuningResult
-from nonlinear.runs.trajectory import COMMAND_UNITS
 from reports import document as doc
 from reports.charts import style
-from reports.sections.names import Unit
+from reports.sections.names import command_unit
 from reports.sections.requirements import item, label, table
 
 
@@ -148,10 +147,9 @@ def _curve(result: TuningResult) -> doc.Block:
 
 
 def checks(result: TuningResult) -> doc.Block:
-    unit, per_SI = COMMAND_UNITS[result.design.axis, result.design.controller.outermost]
     columns = [
         doc.of("corner", "corner", "Design"),
-        doc.of("amplitude_rad", "amplitude", "Step", **Unit(per_SI, unit).column()),
+        doc.of("amplitude_rad", "amplitude", "Step", **command_unit(result.design).column()),
         doc.of("rise_time_s", "rise", "Rise", "ms", scale=1e3, format="ms:3", better=-1),
         doc.of("overshoot_percent", "overshoot", "Overshoot", "%", format="fix:1", better=-1),
         doc.of("settling_time_s", "settling", "Settling 2 %", "ms", scale=1e3, format="ms:3", better=-1),

@@ -80,6 +80,24 @@ def test_friction_that_bends_over_the_speed_fails_the_straight_law(stribeck: flo
     assert all(sure) if stribeck else not any(sure)
 
 
+def test_the_intervals_hold_a_bend_that_is_too_small_to_be_sure() -> None:
+    """Viscous friction was up to 4.5 standard errors off: what a bend moves lies in the rows at reversals."""
+    design, off = load_design("emps"), []
+    for seed in range(30):
+        rng = np.random.default_rng(1000 + seed)
+        time, position, speed, acceleration = _sines(rng, 4000)
+        size, fast, noise = 10.0 ** rng.uniform((-0.3, -2.3, 0.0), (1.3, -0.7, 1.3))
+        dry = (DRY + size * np.exp(-((speed / fast) ** 2))) * np.sign(speed)
+        force = MASS * acceleration + VISCOUS * speed + dry + OFFSET + noise * rng.standard_normal(len(time))
+        record = record_of(time, position=position, force=force)
+        right = diagnosed(design, design, [record], partial(fit_records, design), None)
+        if not right.bend.is_sure:
+            off.append((right.model["viscous"] - VISCOUS) / right.model.std("viscous"))
+    assert len(off) > 15
+    assert np.max(np.abs(off)) < 3.0
+    assert np.sqrt(np.mean(np.square(off))) < 1.3
+
+
 def _first_order_step(inertia: float) -> tuple[np.ndarray, ...]:
     """Time, position and force of a speed that rises to 0.2 m/s: the acceleration is what it lacks."""
     time, constant = 1e-3 * np.arange(3000), 0.05

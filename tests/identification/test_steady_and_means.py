@@ -123,17 +123,25 @@ def test_offset_and_rate_are_found(method: str, offset: float, rate: float) -> N
     assert np.corrcoef(joined["speed"], -joined["torque"])[0, 1] > 0.999
 
 
-def _joined(later: float, method: str = "correlation", drift: float = 0.0) -> ImportedRun:
+def _joined(
+    later: float,
+    method: str = "correlation",
+    drift: float = 0.0,
+    *,
+    seed: int = 3,
+    warm_s: float = 1.5,
+    noise: float = 0.02,
+) -> ImportedRun:
     """A load that comes on so much after the motion, the sensor's clock 0.35 s late, a current that warms."""
-    rng, time, offset = np.random.default_rng(3), np.arange(0.0, 8.0, 1e-3), 0.35
+    rng, time, offset = np.random.default_rng(seed), np.arange(0.0, 8.0, 1e-3), 0.35
     sensor_s = np.arange(0.0, 7.5, 2.3e-3)
 
     def load(at: np.ndarray) -> np.ndarray:
         return -3.0 * np.clip((at - 1.0 - later) / 0.2, 0.0, 1.0)
 
     speed = 200.0 * np.clip((time - 1.0) / 0.2, 0.0, 1.0) + 0.1 * rng.standard_normal(len(time))
-    current = 0.2 * np.sign(speed) - 0.05 * load(time) + 0.02 * rng.standard_normal(len(time))
-    current += drift * (1.0 - np.exp(-np.maximum(time - 1.0, 0.0) / 1.5))
+    current = 0.2 * np.sign(speed) - 0.05 * load(time) + noise * rng.standard_normal(len(time))
+    current += drift * (1.0 - np.exp(-np.maximum(time - 1.0, 0.0) / warm_s))
     torque = load(offset + sensor_s) + 0.01 * rng.standard_normal(len(sensor_s))
     drive = record_of(time, "d", speed=speed, current=current)
     sensor = record_of(sensor_s, "s", torque=torque)
@@ -163,6 +171,21 @@ def test_a_current_that_drifts_is_no_load(later: float, drift: float) -> None:
     join = _joined(later, drift=drift).join
     assert join.offset_s == pytest.approx(0.35, abs=0.01)
     assert join.first_signal == ("current" if later else "speed")
+
+
+@pytest.mark.parametrize("later", [0.0, 1.0])
+def test_the_stated_error_of_a_clock_is_its_error(later: float) -> None:
+    """0.5 ms beside errors of 10 ms: noise of the load was an edge of it, and told rates of the clock too."""
+    rng, off = np.random.default_rng(7), []
+    for seed in range(24):
+        drawn = {"drift": rng.uniform(-0.08, 0.08), "warm_s": rng.uniform(0.3, 3.0)}
+        run = _joined(later, seed=seed, noise=10.0 ** rng.uniform(-2.5, -1.3), **drawn)
+        join, middle = run.join, 3.75
+        off.append((join.offset_s + (join.rate - 1.0) * middle - 0.35) / join.offset_std_s)
+        assert join.first_signal == ("current" if later else "speed")
+    assert np.max(np.abs(off)) < 3.0
+    spread = np.sqrt(np.mean(np.square(off)))
+    assert (0.6 if later else 0.1) < spread < 1.4  # with the speed, edges of two instruments are in it
 
 
 def test_one_event_tells_no_rate_a_given_offset_is_kept_and_strangers_are_refused() -> None:

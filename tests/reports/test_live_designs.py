@@ -14,8 +14,10 @@ from actuator_lti.design.access import paths_of
 from actuator_lti.design.asked import FrozenMap
 from actuator_lti.design.model import Friction, FrictionPoint, Requirement
 from analyses.large_signal.classify import CAUSES, causes
+from analyses.linear.loop_survey import operating_points
 from nonlinear import Rows
 from nonlinear.export.trace import Tape, reached
+from reports.as_json import loop_json
 from reports.live.model import live_model
 from tests.reports import test_held_loops
 from tests.validation.random_drives import full_drive
@@ -109,6 +111,30 @@ def test_periodic_break_points_follow_once_nothing_moves(opens) -> None:
     for name in ("gain_margin", "phase_margin", "delay_margin"):
         assert ours[name] == pytest.approx(getattr(wanted, FIGURES[name]), rel=1e-9)
     assert "fundamental" in page.inner_text('.now th[data-loop="at u"]')
+
+
+def test_cogging_is_seen_on_a_crest_in_a_notch_and_in_motion(opens, tmp_path) -> None:
+    """The loops of `margins` there, of the values as moved; where a crest lets go, the first line says so."""
+    steady = {"motor.cogging": 0.01, "motor.cogging_periods": 12.0, "motor.cogging_phase": 3.0}
+    gear = {"load.gear_error": 2.0, "load.gear_error_periods": 2.0}
+    page = opens(with_values(load_design("joint"), {**steady, **gear}, check=False))
+    crest = "on a crest of the cogging and gear error"
+    assert crest not in page.inner_text(".state")
+    for moved in ({}, {"motor.cogging": 0.04, "motor.cogging_phase": 2.0, "control.position.gain": 9.0}):
+        for key, value in moved.items():
+            page.type_value(key, value / page.sliders()[key]["factor"])
+        design, ours = load_design(page.saved(tmp_path / "moved.toml")), page.read()
+        points = [one for one in operating_points(design, [], described=False, certify=False) if one.design]
+        assert [one.label.split(" of ")[0] for one in points] == ["on a crest", "in a notch", "in motion"]
+        rows = {f"{loop} {at.label}": one.judged for at in points for loop, one in at.figures.items()}
+        for row, one in rows.items():
+            stands = page.get_attribute(f'.now th[data-loop="{row}"]', "data-stable")
+            assert stands == str(int(one.stable)), row
+            for name in ("gain_margin", "phase_margin", "delay_margin", "bandwidth") if one.stable else ():
+                wanted = loop_json(one)[FIGURES[name]]
+                wanted = np.nan if wanted is None else wanted
+                assert ours[row][name] == pytest.approx(wanted, rel=1e-8, nan_ok=True), (row, name)
+    assert f"Unstable {crest}: current, velocity, position." in page.inner_text(".state")
 
 
 def test_where_rounding_decides_no_figure_is_shown(opens, tmp_path) -> None:

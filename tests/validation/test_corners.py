@@ -20,6 +20,7 @@ from analyses.specification import asked_figures
 from analyses.specification.capability import drive_figures
 from analyses.specification.requirements import evaluate_requirements
 from analyses.specification.sensitivity import population_figures
+from reports.build import further_sections
 from reports.sections.corners import chart, section
 from tests.refusals import refused
 
@@ -147,7 +148,7 @@ def test_corners_and_samples_say_the_same_of_what_takes_an_analysis(tmp_path, mo
     It is computed once for all of them.
     """
     duty = Mock(wraps=asked_figures.duty)
-    monkeypatch.setattr(asked_figures, "duty", duty)
+    monkeypatch.setitem(asked_figures._ANSWERS, "duty", duty)
     limits = {"less": 1e-3, "more": 1e3}
     asked = tuple(Requirement(id=id, quantity="duty_current", unit="A", maximum=limit)
                   for id, limit in limits.items())  # fmt: skip
@@ -163,6 +164,8 @@ def test_corners_and_samples_say_the_same_of_what_takes_an_analysis(tmp_path, mo
         assert found.verdict == "not met"
     assert at_corners.left_out[0].reason == sampled.left_out[0].reason
     assert [one.verdict for one in evaluate_requirements(design)] == ["not met", "met"]
+    (shown,) = further_sections(design, ["duty"])
+    assert shown["verdict"] == "not met"
     assert duty.call_count == 1
     assert "Not met: less, fails in the nominal design: " in section(at_corners)["result"]
 

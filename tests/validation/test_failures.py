@@ -166,11 +166,11 @@ def test_section_figure_and_command(cli) -> None:
     assert "--deflection '30 mm'" in cli.refused("failures", "fin", "--deflection", "30 mm")
 
 
-def test_a_drive_without_a_position_loop_has_fewer_cases() -> None:
-    speed = changed(AMBER, controller={"position": None})
-    result = failures(speed, Asked.of(speed, watched_s=0.1))
+def test_a_drive_without_a_loop_has_fewer_cases() -> None:
+    bare = changed(AMBER, controller=dict.fromkeys(("position", "velocity", "current")), requirements=())
+    result = failures(bare, Asked.of(bare, watched_s=0.1))
     assert [case.name for case in result.cases] == ["hard-over", "open-phase"]
-    assert result.left_out["jam"] == "the drive has no position loop"
+    assert result.left_out["jam"] == "the drive has no loop"
     with pytest.raises(InputError, match="beyond the stop, it is 2 times that"):
         Asked.of(AMBER, stop_rad=0.1, deflection_rad=0.2)
 

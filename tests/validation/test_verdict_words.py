@@ -78,8 +78,7 @@ def test_who_states_a_swing_that_is_accepted_has_rest_judged_by_it(
     step = replace(step, rest=replace(step.rest, verdict=ends))
     small = hunting(0.01, 1e-2 * swing_rad, 3.0)  # of less swing than any that is accepted
     found = LimitCycles(design, (), (small, step), ())
-    monkeypatch.setattr(asked_figures, "limit_cycles", lambda _: found)
-    monkeypatch.setattr("analyses.specification.requirements._analyses_of", asked_figures.AskedFigures)
+    monkeypatch.setattr(asked_figures, "_answered", lambda *_: found)
     rows = (judged("bandwidth", "position", 1.0, 1.0, 0.1, unit="Hz"),)
     validation = Validation(design=design, rows=rows, figures={}, settlings=found.rests)
     assert (found.verdict, validation.verdict) == (verdict, verdict)

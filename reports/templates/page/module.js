@@ -11,11 +11,19 @@ export const view = (at, count) => new Float64Array(x.memory.buffer, at, count);
 export const stageOf = (name) => data.stages[name];
 
 export const slow = new Set(); // loops whose step takes too long for a moving slider: a slow pole beside a short period
+const inwards = [...data.loops].reverse();
+// the loops where cogging and gear error are steepest, and in a motion that averages them
+const turnedOf = (row) => Object.fromEntries(Object.entries(data.turned).map(([where, puts]) => {
+  const there = { row: row.slice(), loops: {} };
+  for (const [place, value] of puts) there.row[place] = value;
+  for (const name of inwards) there.loops[name] = judged(there, name, 0);
+  return [where, there.loops];
+}));
 export const compute = (values, whole) => {
   const row = rowOf(values);
   if (!row) return null;
-  const found = { row, drive: driveOf(values), loops: {}, points: {} };
-  for (const name of [...data.loops].reverse()) {
+  const found = { row, drive: driveOf(values), loops: {}, points: {}, turned: turnedOf(row) };
+  for (const name of inwards) {
     const began = performance.now(), timed = whole || !slow.has(name);
     found.loops[name] = judged(found, name, timed ? 1 : 0);
     found.loops[name].waits = !timed;

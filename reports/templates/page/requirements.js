@@ -26,16 +26,21 @@ export const state = () => {
   const { refused } = desk, line = find(".state"), all = judged(desk.now), was = judged(desk.before), total = all.length;
   const fails = all.filter(({ met }) => met === false), old = was.filter(({ met }) => met === false), open = all.filter(({ met, words }) => met === null && words !== "…");
   const unstable = data.loops.filter((name) => desk.now.loops[name].figures && desk.now.loops[name].figures[STABLE] !== 1);
-  const unknown = data.loops.filter((name) => desk.now.loops[name].n === DOUBT), words = [];
+  const unknown = data.loops.filter((name) => desk.now.loops[name].n === DOUBT), words = [], elsewhere = [];
   if (unknown.length) words.push(`Stability not known: ${unknown.join(", ")}.`);
   if (unstable.length) words.push(`Unstable: ${unstable.join(", ")}.`);
+  for (const [where, loops] of Object.entries(desk.now.turned)) {
+    const lost = data.loops.filter((name) => !unstable.includes(name) && loops[name].figures && loops[name].figures[STABLE] !== 1);
+    if (lost.length) words.push(`Unstable ${where}: ${lost.join(", ")}.`);
+    elsewhere.push(...lost);
+  }
   const met = all.filter((one) => one.met).length, count = (many, word) => (many ? `, ${many} ${word}` : "");
   const designed = changes().length && old.length !== fails.length ? ` (as designed: ${old.length} not met)` : "";
   const named = [...fails, ...open].slice(0, NAMED).map(({ item }) => (item.loop ? `${item.words} of the ${placed(item).toLowerCase()}` : `${item.words} ${placed(item)}`.trim())), more = fails.length + open.length - named.length;
   if (total) words.push(`${met} of ${total} requirements met${count(fails.length, "not met")}${count(open.length, "not proven")}${designed}${named.length ? `: ${named.join(", ")}${more ? ` and ${more} more` : ""}` : ""}.`);
   else if (!data.apart.length) words.push("The design states no requirements.");
   if (data.apart.length) words.push(`${data.apart.length} ${data.apart.length === 1 ? "does" : "do"} not follow the sliders: ${[...new Set(data.apart.map((item) => item.words))].join(", ")}.`);
-  line.className = `state ${refused || unstable.length || fails.length ? "fail" : unknown.length || open.length ? "warn" : total ? "pass" : "info"}`;
+  line.className = `state ${refused || unstable.length || fails.length ? "fail" : unknown.length || elsewhere.length || open.length ? "warn" : total ? "pass" : "info"}`;
   line.textContent = refused || words.join(" "); // what is refused has no verdict
   line.dataset.failing = fails.length;
   demands(all, was);

@@ -1,0 +1,253 @@
+"""A run-down: nothing drives, friction alone stops the drive, and its decay is fitted over time."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.linalg import block_diag
+from scipy.optimize import least_squares
+from scipy.signal import lfilter
+from scipy.stats import f as variance_ratio
+
+from actuator_lti.design.model import Design
+from actuator_lti.errors import InputError
+from actuator_lti.types import Floats
+from analyses.estimation.fit import Fixed
+from analyses.estimation.least_squares import scaled_lstsq, told_apart, wider_covariance
+from analyses.estimation.parameters import default_value
+from analyses.identification.asked import Friction
+from analyses.identification.joint_model import NAMES, FrictionForm, JointModel, RecordFit
+from analyses.identification.rows import (
+    drive_of,
+    is_loaded,
+    is_white,
+    motion_of,
+    recipe_for,
+    record_rows,
+    stands,
+)
+from analyses.records.consistency import NO_CHANCE, place_of
+from analyses.records.naming import RATES
+from analyses.records.record import Record, period_of
+
+SLOW = 0.1  # of the largest speed: the decay down to it is where a search begins
+
+
+def runs_down(design: Design, record: Record) -> bool:
+    """Whether nothing that is known drives a record: no current, force or voltage, and no load."""
+    acts = design.load.acting() or design.coupling is not None or design.motor.over_angle.bends
+    return not (acts or is_loaded(record) or np.any(drive_of(design, record)[0]))
+
+
+def switched_off(design: Design, record: Record) -> Record:
+    """The record; of a motion whose current is white noise that moves nothing (F-test), with none."""
+    if not np.any(current := record.signals.get("current", np.zeros(1))) or stands(design, record):
+        return record
+    recipe = recipe_for(record)
+    motion = motion_of(design, record, recipe)[0]
+    table = np.column_stack([motion.acceleration, motion.velocity, np.sign(motion.velocity)])
+    rest = current - table @ scaled_lstsq(table, current)
+    least, free = float(rest @ rest), len(rest) - table.shape[1]
+    told = (float(current @ current) - least) / table.shape[1] / (least / free)
+    if not is_white(current, record, recipe) or variance_ratio.sf(told, table.shape[1], free) < NO_CHANCE:
+        return record
+    note = "the current is noise about zero, and moves nothing: taken as none, a run-down"
+    none = {**record.signals, "current": np.zeros_like(current)}
+    return replace(record, signals=none, notes=(*record.notes, note))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Decay:
+    """``w = (w0 + q/p) exp(-p t) - q/p`` until it stands, p = b/J and q = T/J, fitted to a record."""
+
+    ratios: Floats  # p, 1/s, and q, rad/s2 (m/s2)
+    covariance: Floats
+    side: int  # of the motion
+    speed: Floats  # at the motor, as the acceleration: those of the decay
+    acceleration: Floats
+    rest: Floats  # what is recorded less the decay
+    begin: Floats  # its slopes over the values at the begin, shape (n, 1 or 2)
+    at_place: bool  # whether a position is fitted, and no speed
+    step_s: float
+
+    def answer(self, torque: Floats) -> Floats:
+        """What a torque over the inertia, against the motion, makes of what is fitted, but for the begin."""
+        fall = np.exp(-self.ratios[0] * self.step_s)
+        of_speed = lfilter([0.0, -self.step_s], [1.0, -fall], np.where(self.speed, torque, 0.0))
+        made = self.step_s * np.cumsum(of_speed) if self.at_place else of_speed * (self.speed != 0.0)
+        return np.asarray(made - self.begin @ scaled_lstsq(self.begin, made))
+
+    @property
+    def relative_error(self) -> float:
+        """Norm of what is left over that of what friction takes."""
+        known = self.rest + self.answer(-self.acceleration)
+        return float(np.linalg.norm(self.rest) / np.linalg.norm(known))
+
+
+def decay_of(design: Design, record: Record, *, found: bool = True) -> Decay:
+    """Fit the decay to a record's position or, without one, speed; with given ratios its begin alone.
+
+    Least squares of the output, of which no derivative is taken; errors respect the correlation in time of
+    what is left.
+    """
+    period, place = period_of(record), place_of(design, record)
+    seen = record[RATES[design.axis]] if place is None else place[1]
+    speed = motion_of(design, record, recipe_for(record))[0].velocity
+    side = 1 if float(np.sum(speed)) >= 0.0 else -1
+    time, speed, first = (
+        period * np.arange(len(seen)),
+        side * speed,
+        [] if place is None else [side * seen[0]],
+    )
+    moves = speed > SLOW * np.max(speed)
+    table = np.column_stack([np.ones_like(time), -period * np.cumsum(speed), -time])
+    about = scaled_lstsq(table[moves], speed[moves])
+    law, begin, given = design.friction, np.array([*first, about[0]]), about[1:]
+    if not found:
+        torque = law.dry_Nm(0.0, side) + side * law.offset_torque_Nm
+        given = np.array([law.viscous(side), torque]) / design.inertia_kgm2
+
+    def decay(x: Floats) -> tuple[Floats, Floats]:
+        """Speed, and what is recorded."""
+        w0, (p, q) = x[len(first)], x[len(begin) :] if len(x) > len(begin) else given
+        p = p or 1e-12
+        stop = np.log1p(w0 * p / q) / p if q * w0 > 0.0 < q + w0 * p else np.inf
+        held = -np.expm1(-p * np.minimum(time, stop)) / p
+        w = np.where(time < stop, w0 - (p * w0 + q) * held, 0.0)
+        return w, w if place is None else x[0] + w0 * held - q * (np.minimum(time, stop) - held) / p
+
+    goes = decay(np.append(begin, about[1:]))[0] > 0.0  # at rest a position errs by one part of a count
+    start = np.append(begin, given) if found else begin
+    solved = least_squares(lambda x: goes * (decay(x)[1] - side * seen), start, method="lm", x_scale="jac")
+    p, q = ratios = np.asarray(solved.x[len(begin) :] if found else given)
+    w = decay(solved.x)[0]
+    covariance = wider_covariance([(solved.jac[goes], solved.fun[goes])])[len(begin) :, len(begin) :]
+    return Decay(
+        ratios=ratios,
+        covariance=covariance,
+        side=side,
+        speed=side * w,
+        acceleration=-side * (p * w + q) * (w > 0.0),
+        rest=-side * solved.fun,
+        begin=solved.jac[:, : len(begin)],
+        at_place=place is not None,
+        step_s=period,
+    )
+
+
+def fit_run_downs(
+    design: Design, records: Sequence[Record], form: Friction, held: Mapping[str, float]
+) -> JointModel:
+    """Friction of records that nothing drives, at the design's inertia; or that, at friction ``held``.
+
+    They show friction over inertia, and no torque: what is kept says so, and the ratios.
+
+    Raises `InputError`: for a friction map.
+    """
+    if form == "map":
+        told = "--friction map: of a run-down are allowed symmetric and per-direction"
+        raise InputError(told, where=records[0].name)
+    decays, names = [decay_of(design, record) for record in records], NAMES[form]
+    table = _balance(decays, form)
+    own = {name: held.get(name, default_value(design, name)) for name in names}
+    known = [name for name in names[1:] if held.get(name)]
+    inertia = "inertia" in held or not known
+    free = [name for name in names if name not in held and not (inertia and name == "inertia")]
+    picked, left = told_apart(table[:, [names.index(name) for name in free]], free)
+    no_load = Fixed(
+        value=design.friction.load_coefficient, reason="no load is recorded: the design's value kept"
+    )
+    fixed = {"load_coefficient": no_load}
+    fixed |= {name: Fixed(value=value, reason="fixed as asked") for name, value in held.items()}
+    for each in left:
+        why, at = f"{each}: the design's value kept", {n: -one for n, one in each.moves.items()}
+        fixed[each.name] = Fixed(value=own[each.name], reason=why, moves=at)
+    found = tuple(free[k] for k in picked)
+    columns = table[:, [names.index(name) for name in found]]
+    target = -sum(own[name] * table[:, k] for k, name in enumerate(names) if name not in found)
+    spread = block_diag(*(np.linalg.cholesky(one.covariance) for one in decays))
+    weighed = np.linalg.solve(spread, np.column_stack([columns, target]))
+    values = scaled_lstsq(weighed[:, :-1], weighed[:, -1])
+    total = own["inertia"] if inertia else float(values[found.index("inertia")])
+    moves = dict(zip(found, (values / total).tolist(), strict=True))
+    said = f"a run-down shows friction over inertia alone, {_said(decays, design.axis)}"
+    why = "fixed as asked" if known or "inertia" in held else "the design's value kept"
+    for name in ["inertia"] if inertia else known:
+        at = {n: one * total / own[name] for n, one in moves.items()}
+        fixed[name] = Fixed(value=own[name], reason=f"{said}: {why}, all others grow with it", moves=at)
+    parts = tuple(
+        _part(design, *pair, form, found, values, total) for pair in zip(records, decays, strict=True)
+    )
+    drive, rest = (np.concatenate([getattr(part, name) for part in parts]) for name in ("y", "residual"))
+    covariance = total**2 * np.linalg.inv(weighed[:, :-1].T @ weighed[:, :-1])
+    return JointModel(
+        names=found,
+        values=values,
+        white_errors=np.sqrt(np.diag(covariance)),
+        covariance=covariance,
+        between={},
+        fixed=fixed,
+        relative_residual=float(np.linalg.norm(rest) / np.linalg.norm(drive)),
+        records=parts,
+        recipe=parts[0].recipe,
+        condition=float(np.linalg.cond(columns / np.linalg.norm(columns, axis=0))),
+        weights=(1.0,) * len(parts),
+        form=form,
+        bias_told="no derivative is taken of what is recorded: none",
+    )
+
+
+def _balance(decays: Sequence[Decay], form: FrictionForm) -> Floats:
+    """Coefficients of every name in ``p J - b = 0`` and ``q J - T = 0`` of each decay, two rows for each."""
+    names = NAMES[form]
+    laws = {1: names[1:3], -1: names[-2:] if form == "per-direction" else names[1:3]}
+    table = np.zeros((2 * len(decays), len(names)))
+    for k, one in enumerate(decays):
+        table[2 * k : 2 * k + 2, 0] = one.ratios
+        table[[2 * k, 2 * k + 1], [names.index(name) for name in laws[one.side]]] = -1.0
+        table[2 * k + 1] -= [one.side * (name == "offset") for name in names]
+    return table
+
+
+def _said(decays: Sequence[Decay], axis: str) -> str:
+    """The ratios of each record, with their standard errors."""
+    unit = "m/s2" if axis == "linear" else "rad/s2"
+    errors = [np.sqrt(np.diag(one.covariance)) for one in decays]
+    each = [
+        f"b/J = {one.ratios[0]:.4g} ± {p:.2g} 1/s and T/J = {one.ratios[1]:.4g} ± {q:.2g} {unit}"
+        for one, (p, q) in zip(decays, errors, strict=True)
+    ]
+    return "; ".join(each)
+
+
+def _part(
+    design: Design,
+    record: Record,
+    decay: Decay,
+    form: FrictionForm,
+    names: Sequence[str],
+    values: Floats,
+    inertia: float,
+) -> RecordFit:
+    """The rows of one record: what each torque makes of what is recorded, times inertia over time."""
+    rows, count = record_rows(design, record, form, None), len(record)
+    scale = (record.period_s * count) ** -(2.0 if decay.at_place else 1.0)
+    shapes = {"inertia": decay.acceleration, "viscous": decay.speed, "offset": np.ones(count)}
+    shapes["dry"] = np.full(count, float(decay.side))
+    table = scale * np.column_stack([decay.answer(shapes[name.partition("_")[0]]) for name in names])
+    rest, inputs = scale * inertia * decay.rest, np.column_stack([decay.speed, decay.acceleration])
+    more = {"residual": rest, "own_residual": rest, "noise": rest, "inputs": inputs}
+    every = np.ones(count, dtype=bool)
+    own = replace(
+        rows,
+        names=tuple(names),
+        w=table,
+        y=table @ values + rest,
+        speed=decay.speed,
+        acceleration=decay.acceleration,
+        step_s=record.period_s,
+        keep=every,
+        answer=lambda torque: scale * decay.answer(torque),
+    )
+    friction = -inertia * decay.acceleration + rest
+    return RecordFit(**vars(own), **more, friction=friction, compared=every)
