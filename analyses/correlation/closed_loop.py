@@ -251,11 +251,11 @@ def _with_steps(
     if driven.hold is not None and not driven.hold.is_whole:
         ends = driven.hold.more_s(early)
         if driven.early_s is None:
-            more = likeliest_s(driven.design, made, time, measured, ends)
-            early, series = early + more, signals_at(driven.design, made, time + more)
+            later = likeliest_s(driven.design, made, time, measured, ends)
+            early, series = early + later, signals_at(driven.design, made, time + later)
         else:  # what was found may be a little beyond the ends, but no row sees another voltage
-            more = float(np.clip(0.0, *ends))
-            series = signals_at(driven.design, made, time + more, -more)
+            inside = float(np.clip(0.0, *ends))
+            series = signals_at(driven.design, made, time + inside, -inside)
     return replace(driven, early_s=early), made, series
 
 

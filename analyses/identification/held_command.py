@@ -227,7 +227,7 @@ def _at_their_rows(
     ``told``: slopes over the values and what is left, of unit size. Also the largest of the moves, in its
     standard errors. ``anywhere``: not only from where they are.
     """
-    gram = sum(w.T @ w for w, _ in told)
+    gram = np.sum([w.T @ w for w, _ in told], axis=0)
     pairs = [slice(k, k + 2) for k in range(0, len(told), 2)]
     each = [
         _at_its_rows(design, one, sizes[pair], told[pair], gram, anywhere)

@@ -171,10 +171,9 @@ def test_a_run_is_known_between_its_ticks() -> None:
     ticks = np.arange(len(volts)) * TICK_S
     run = simulate(bare, commands.events(ticks, volts), ticks[-1])
     other = simulate(fine, commands.events(ticks, volts), ticks[-1])
-    seen = signals_at(bare, run, other.time_s[: -2 * coarse])
-    for name, truth in (("angle", other.motor_angle_rad), ("speed", other.motor_speed_rad_s)):
-        assert seen[name] == pytest.approx(truth[: -2 * coarse], rel=1e-6, abs=1e-9)
-    assert seen["current"] == pytest.approx(
-        other.current_A[: -2 * coarse], abs=1e-6 * np.ptp(other.current_A)
-    )
-    assert np.array_equal(seen["voltage"], np.repeat(volts[:-3], coarse)[: len(seen["voltage"])])
+    part = slice(coarse, -2 * coarse)
+    seen = signals_at(bare, run, other.time_s[part])
+    truth = {"angle": other.motor_angle_rad, "speed": other.motor_speed_rad_s, "current": other.current_A}
+    for name, values in truth.items():
+        assert seen[name] == pytest.approx(values[part], abs=1e-6 * np.ptp(values)), name
+    assert np.array_equal(seen["voltage"], np.repeat(volts[1:], coarse)[: len(seen["voltage"])])
