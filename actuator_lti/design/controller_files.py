@@ -7,14 +7,15 @@ amplitude-invariant Clarke transform), i = sqrt(3)/2 I_peak and u = sqrt(3) U_pe
 Periods: EPOS4 25 kHz and 2.5 kHz (EPOS4 50/5 Hardware Reference, maxon, 2023-07, rel11726, section 2.1).
 ODrive 3: a clock of 168 MHz over 2 * 3500 counts and 3 repetitions, 8 kHz; its speed comes from a critically
 damped tracking loop (1000 rad/s where the file names no bandwidth), its current gains from a bandwidth:
-p = w L, i = w R (firmware: main.h, encoder.cpp, motor.cpp). VESC and SimpleFOC fix no period here.
+p = w L, i = w R (firmware: main.h, encoder.cpp, motor.cpp). Its position controller is a P alone
+(controller.cpp). VESC and SimpleFOC fix no period here.
 
 VESC: lo_current_max = l_current_max l_current_max_scale (mc_interface.c); the speed loop's output is taken
 times that and the scale once more (foc_math.c, firmware 5.3 and later). SimpleFOC: U = R I of a phase where
 the motor has its resistance, and with a KV the back-EMF besides, up to 2.3 by voltage (BLDCMotor.cpp), from
 2.4 by estimated_current (FOCMotor.cpp). Its voltage_limit is the amplitude of a phase, 12 V where nothing is
 set, as is the supply; the driver keeps each phase between 0 and its own limit (defaults.h, FOCMotor.cpp,
-BLDCDriver3PWM.cpp). An output_ramp of 0 is none (pid.cpp).
+BLDCDriver3PWM.cpp). An output_ramp of 0 is none (pid.cpp); I and D of P_angle are 0 where nothing is set.
 
 No object of an EPOS4's export is a filter of its D part: derivative_filter stays as it is.
 """
@@ -33,9 +34,10 @@ from actuator_lti.design.fields import FIELDS, parts_of
 from actuator_lti.design.model import Design
 from actuator_lti.design.objects import Imported
 from actuator_lti.design.settings_file import parsed_xml, placed
+from actuator_lti.design.spellings import split_quantity
 from actuator_lti.design.units import si_text
 from actuator_lti.design.writing import with_overrides
-from actuator_lti.errors import InputError, in_file
+from actuator_lti.errors import InputError, Mistakes, as_one, in_file
 from actuator_lti.files.reading import Tree, parse_json, read_text, shown, shown_path
 
 Stage = Literal["velocity", "-velocity", "current", "-current"]
@@ -48,6 +50,10 @@ _COMMENT = re.compile(r"//[^\n]*|/\*.*?(?:\*/|\Z)", re.S)
 _ASSIGNED = re.compile(r"(?:^|(?<=;))[ \t]*(\w+)\.([\w.]+)\s*=\s*([^;\n]+);", re.M)
 _BUILT = re.compile(r"\bBLDCMotor\s+(\w+)\s*(?:=\s*BLDCMotor\s*)?\(([^)]*)\)")
 _ARGUMENTS = ("pole_pairs", "phase_resistance", "KV_rating", "phase_inductance")
+
+
+_NO_FILTER = {"control.velocity.filter": None}  # no more than the measured speed's own
+_NO_FRICTION = {"control.position.friction_feedforward": None, "control.position.derivative_filter": None}
 
 
 class Setting:
@@ -73,7 +79,7 @@ class Format:
     known: re.Pattern[str]
     read: Callable[[str, str], Tree]
     settings: tuple[Setting, ...]
-    fixed: Mapping[str, Any] = field(default_factory=dict)
+    fixed: Mapping[str, Any] = field(default_factory=dict)  # None: no such controller has it
     unfit: Callable[[Tree, Design], str] = lambda given, design: ""
     also: Mapping[str, tuple[Stage | None, str]] = field(default_factory=dict)
     """Names that are understood without a key, each with what there is to say of it, and when."""
@@ -173,7 +179,8 @@ FORMATS = (
         ),
         {"control.period": "125 us", "control.velocity.every": 1, "control.position.every": 1,
          "encoder.speed": "tracking", "encoder.bandwidth": "1000 rad/s",
-         "encoder.filter_time": "0 s"},
+         "encoder.filter_time": None, "control.position.integral_time": None,
+         "control.position.derivative_time": None, **_NO_FRICTION, **_NO_FILTER},
         _motor_type, {_TYPE: (None, "")},
         newer={"axis0.config.motor.": _MOTOR, "current_soft_max": "current_lim",
                "axis0.config.encoder_bandwidth": _AXIS + "bandwidth",
@@ -194,7 +201,7 @@ FORMATS = (
             Setting("limits.speed", "rad/s", lambda rpm, poles: _ratio(rpm * RPM, poles / 2.0),
                   "l_max_erpm", "si_motor_poles"),
         ),
-        assumed={"l_current_max_scale": 1.0},
+        _NO_FILTER, assumed={"l_current_max_scale": 1.0},
     ),
     Format(
         "EPOS4 object export", re.compile(r'^\s*\[30A0sub1\]|index="(0x)?30A0"', re.I | re.M), _canopen,
@@ -223,6 +230,8 @@ FORMATS = (
         "SimpleFOC settings", re.compile(r"\.(PID_velocity|P_angle|PID_current_q)\."), _sketch,
         (
             Setting("control.position.gain", "1/s", 1.0, "P_angle.P"),
+            Setting("control.position.integral_time", "s", _ratio, "P_angle.P", "P_angle.I"),
+            Setting("control.position.derivative_time", "s", _ratio, "P_angle.D", "P_angle.P"),
             Setting("control.velocity.gain", "A*s/rad", A_dc, "PID_velocity.P", when="current"),
             Setting("control.velocity.gain", "V*s/rad", lambda gain, R: V_dc * gain * R, "PID_velocity.P",
                   "phase_resistance", when="-current"),
@@ -238,7 +247,7 @@ FORMATS = (
                   "voltage_power_supply", "driver.voltage_limit"),
             Setting("limits.speed", "rad/s", 1.0, "velocity_limit"),
         ),
-        {}, _torque_mode,
+        {**_NO_FRICTION, **_NO_FILTER}, _torque_mode,
         {"torque_controller": (None, ""), "pole_pairs": (None, ""),
          "phase_resistance": ("-current", "by voltage the gain is taken times it, as by the library up to "
          "2.3; from 2.4 on that is right by estimated_current only"),
@@ -246,8 +255,8 @@ FORMATS = (
          "[control.current] has no key for: not carried over"),
          "LPF_current_q.Tf": ("current", "the filter of the measured current has no key in a design: not "
          "carried over")},
-        assumed={"phase_resistance": 1.0, "voltage_limit": 12.0, "voltage_power_supply": 12.0,
-                 "driver.voltage_limit": inf},
+        assumed={"P_angle.I": 0.0, "P_angle.D": 0.0, "phase_resistance": 1.0, "voltage_limit": 12.0,
+                 "voltage_power_supply": 12.0, "driver.voltage_limit": inf},
         off=("PID_velocity.D", "PID_current_q.D", "PID_current_q.output_ramp"),
     ),
 )  # fmt: skip
@@ -270,18 +279,53 @@ def import_controller_file(path: Path, base: Design) -> Imported | None:
             raise InputError(unfit)
     overrides, used, notes = _overrides(found, given, spelled, base, path.name)
     tables = {key.rpartition(".")[0] for key in overrides} | {table for _, table, _ in parts_of(base)}
-    fixed = {
-        key: value if key == "encoder.speed" else {"value": value, "source": found.words}
-        for key, value in found.fixed.items()
-        if key.rpartition(".")[0] in tables
-    }
+    fixed = {key: value if value in (None, "tracking") else {"value": value, "source": found.words}
+             for key, value in found.fixed.items() if key.rpartition(".")[0] in tables}  # fmt: skip
     known = {*used, *found.also, *(name for name in found.off if _number(given.get(name)) == 0.0)}
     left = ", ".join(name for older, name in spelled.items() if older not in known) or "none"
-    design = with_overrides(base, changes := {**fixed, **overrides})
+    notes += [f"{key} is left out: no such controller has it" for key, value in fixed.items()
+              if value is None and _says(base, key)]  # fmt: skip
+    overrides |= (lowered := _lowered(base, overrides))
+    notes += [f"{key}: {base.limits.continuous_current_A:g} A dc is lowered to limits.peak_current"
+              for key in lowered]  # fmt: skip
+    design = _onto(base, changes := {**fixed, **overrides})
     notes = [f"read as {found.words}", *notes, *_kept_delay(base, design)]
     notes += [f"not understood, of {len(given)} settings: {left}"]
     changed = tuple(key for key in changes if key in design.parameters)
     return Imported(design=design, changed=changed, kept=(), notes=tuple(notes))
+
+
+def _lowered(base: Design, overrides: Mapping[str, Any]) -> dict[str, Any]:
+    """The continuous current as the file's peak current, where the base has more than the drive gives."""
+    peak, key = overrides.get("limits.peak_current"), "limits.continuous_current"
+    if peak is None or key in overrides:
+        return {}
+    above = split_quantity(peak["value"])[0] < base.limits.continuous_current_A < inf
+    return {key: {**peak, "source": f"limits.peak_current, of {peak['source']}"}} if above else {}
+
+
+def _onto(base: Design, changes: Mapping[str, Any]) -> Design:
+    """The design that the file makes; a refusal tells which values are the file's."""
+    try:
+        return with_overrides(base, changes)
+    except InputError as error:
+        mistakes = error.mistakes if isinstance(error, Mistakes) else (error,)
+        raise as_one([InputError(f"{one.message}{_brought(one.message, base, changes)}", one.where)
+                      for one in mistakes]) from None  # fmt: skip
+
+
+def _brought(message: str, base: Design, changes: Mapping[str, Any]) -> str:
+    """What the file has to do with a refusal: the keys that this names, else the stages that are new."""
+    there = {table for _, table, _ in parts_of(base)}
+    sources = {key: value["source"] for key, value in changes.items() if isinstance(value, dict)}
+    named = [key for key in sources if key in message]
+    named = named or [key for key in sources if key.rpartition(".")[0] not in there]
+    return "".join(f"; {key} is of {sources[key]}" for key in named)
+
+
+def _says(design: Design, key: str) -> bool:
+    """Whether a design's file has a key, or a list of tables."""
+    return any(f"{path}.".startswith(f"{key}.") for path in design.parameters)
 
 
 def _kept_delay(base: Design, design: Design) -> list[str]:
@@ -319,7 +363,7 @@ def _overrides(
         )
         if value == _none(item.key):
             overrides[item.key] = None
-            notes.append(f"{stated}: none, {item.key} is left out")
+            notes += [f"{stated}: none, {item.key} is left out"] if _says(base, item.key) else []
         elif value > 0.0 and isfinite(value):
             text = value if item.unit == "1" else si_text(value, item.unit.replace("A", "A dc"))
             overrides[item.key] = {"value": text, "source": f"{file}: {stated}"}

@@ -7,12 +7,13 @@ from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import asdict, is_dataclass
 from dataclasses import fields as dataclass_fields
-from math import inf, isfinite
+from math import inf, isclose, isfinite
 from numbers import Integral, Real
 from typing import Any, cast
 
 import tomli_w
 
+from actuator_lti.asked.quantities import unit_words
 from actuator_lti.design.access import located, unit_in_file
 from actuator_lti.design.asked import ControllerObjects, Parameter, Tolerance, default_deflection
 from actuator_lti.design.data_sheet import as_stated
@@ -22,6 +23,7 @@ from actuator_lti.design.mistakes import UNREAD, Findings
 from actuator_lti.design.model import Design
 from actuator_lti.design.reader import Reader
 from actuator_lti.design.settings_file import object_entry
+from actuator_lti.design.spellings import split_quantity
 from actuator_lti.design.tolerances import tolerances
 from actuator_lti.design.units import ampere_unit, si_text
 from actuator_lti.errors import InputError, instance_of
@@ -217,6 +219,31 @@ def read_value(design: Design, path: str, text: str | float) -> float:
         value = getattr(located(reader.with_gains(design), path)[1], field.attribute)
     findings.refuse()
     return cast("float", value)
+
+
+def unit_as_stated(design: Design, path: str) -> tuple[str, float]:
+    """The unit in which a design's file states a key, and SI over it.
+
+    That of SI where the file has none, or one in which half the number is not half the value (rpm/V).
+
+    >>> from actuator_lti.design import load_design
+    >>> unit_as_stated(load_design("ilr33-amber"), "motor.rotor_inertia")
+    ('g*cm^2', 1e-07)
+    """
+    known = design.parameters.get(path)
+    with suppress(ValueError, ZeroDivisionError):
+        number, unit = split_quantity("" if known is None else known.text)
+        if unit and known is not None:
+            half = read_value(design, path, f"{0.5 * number!r} {unit}")
+            if isclose(half, 0.5 * known.value, rel_tol=1e-12):
+                return unit, known.value / number
+    return unit_in_file(design, path, located(design, path)[0]), 1.0
+
+
+def value_as_stated(design: Design, path: str, value: float) -> str:
+    """A value of a key to four digits, in the unit in which the design's file states that key."""
+    unit, per_SI = unit_as_stated(design, path)
+    return f"{value / per_SI:.4g} {unit_words(unit)}".rstrip()
 
 
 def _override(tree: Tree, path: str, value: Any, design: Design) -> None:

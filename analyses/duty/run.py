@@ -3,13 +3,14 @@
 from bisect import bisect_left
 from dataclasses import dataclass, replace
 from functools import cached_property
-from math import exp, inf, isfinite, log, sqrt
+from math import exp, inf, isfinite, log, pi, sqrt
 
 import numpy as np
 
 from actuator_lti.asked.verdict import Tally, Verdict
 from actuator_lti.design.loader import AnyDesign, as_design
 from actuator_lti.design.model import Design
+from actuator_lti.drive.operating import follows_angle, runs
 from actuator_lti.drive.steady import winding
 from actuator_lti.errors import InputError, instance_of
 from actuator_lti.types import Floats
@@ -57,12 +58,17 @@ class Duty:
     # Largest from the supply into the winding and back, of copper and shaft; in motion
     peak_power_W: float
     fed_back_W: float
-    # One period of the steady motion
+    # One period of the steady motion, or several where the load turns with the drive
     time_s: Floats
     current_A: Floats
     # None without overload protection, without a thermal resistance in the design
     overload: Overload | None
     heating: Heating | None
+
+    @property
+    def period_ticks(self) -> int:
+        """Rows of one period of the motion."""
+        return _period(self.asked, self.design.controller.period_s, self.time_s.size)
 
     @property
     def rms_torque_Nm(self) -> float:
@@ -106,7 +112,7 @@ class Duty:
         return Verdict.of(all(stated) if stated else None)
 
 
-PERIODS = 3  # of the motion that pass before one is taken
+PERIODS, MANY = 3, 32  # of the motion that pass before one is taken; that are taken at the most
 HOLD_S = 1.0
 MOST_TICKS = 2_000_000
 MOST_CYCLES = 2**40
@@ -162,19 +168,28 @@ def duty(design: AnyDesign, asked: Asked | None = None) -> Duty:
 
 
 def _moving(design: Design, asked: Asked) -> tuple[Trajectory, int]:
-    """The motion until it is steady, and the ticks of a period."""
+    """The motion until it is steady, and the ticks of the periods that are taken."""
     Ts, size = design.controller.period_s, asked.size_of(design)
     every = round(design.controller.period_of(design.controller.outermost) / Ts)
     lowest = (PERIODS + 1) / (MOST_TICKS * Ts)
     if asked.frequency_hz < lowest:
         raise InputError(f"frequency {asked.frequency_hz:g} Hz: at least {lowest:.2g} Hz with this period")
     ticks = max(1, round(1.0 / (asked.frequency_hz * Ts * every))) * every
-    command, whole = commands.sine(size, 1.0 / (ticks * Ts)), (PERIODS + 1) * ticks
+    taken = _periods(design, asked, MOST_TICKS // ticks - PERIODS)
+    command, whole = commands.sine(size, 1.0 / (ticks * Ts)), (PERIODS + taken) * ticks
     if asked.ramp_s > 0.0:
         time = np.arange(0, whole, every)
         ends = np.array([0.0, asked.ramp_s / Ts, ticks - asked.ramp_s / Ts, ticks])
         command = commands.sampled(time * Ts, np.interp(time % ticks, ends, [0.0, size, size, 0.0]))
-    return simulate(design, command, whole * Ts, asked.load_Nm), ticks
+    return simulate(design, command, whole * Ts, asked.load_Nm), taken * ticks
+
+
+def _periods(design: Design, asked: Asked, most: int) -> int:
+    """How many are taken: where a load turns with its drive as many as come nearest to whole turns."""
+    if not (runs(design) and follows_angle(design) and asked.ramp_s > 0.0 and asked.share == 1.0):
+        return 1
+    turns = asked.size_of(design) * (1.0 / asked.frequency_hz - asked.ramp_s) / (2.0 * pi)
+    return min(range(1, min(most, MANY) + 1), key=lambda k: abs(k * turns - round(k * turns)))
 
 
 def _overload(design: Design, asked: Asked, current: Floats, held: float) -> Overload | None:
@@ -214,7 +229,16 @@ def _overload(design: Design, asked: Asked, current: Floats, held: float) -> Ove
     if peak < 1.0:
         return Overload(peak, None)
     cycles = bisect_left(range(MOST_CYCLES), 1.0, key=lambda k: cycle(settled * (1.0 - slope**k))[0])
-    return Overload(peak, (cycles + 1) * (moving * Ts + rest_s))
+    if asked.share < 1.0:
+        return Overload(peak, (cycles + 1) * (moving * Ts + rest_s))
+    one = _period(asked, Ts, drive.size)
+    over = int(np.argmax(decay * settled * (1.0 - slope**cycles) + gained >= 1.0))
+    return Overload(peak, (cycles * drive.size + (over // one + 1) * one) * Ts)
+
+
+def _period(asked: Asked, Ts: float, taken: int) -> int:
+    """Ticks of a period, of those of all that are taken."""
+    return taken // max(1, round(taken * Ts * asked.frequency_hz))
 
 
 def _moving_ticks(asked: Asked, Ts: float, period: int) -> int:

@@ -6,7 +6,7 @@ prediction is judged on it as `analyses.validation` judges it.
 
 import sys
 import tempfile
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from actuator_lti.asked.verdict import Verdict
@@ -43,10 +43,11 @@ def check_code(design: Design) -> CodeCheck:
     command = compiler.system_compiler()
     if command is None or not sys.platform.startswith(("linux", "darwin")):
         return CodeCheck(reason="no C compiler on the machine of the export")
+    exported = replace(LIBRARY, forms=tuple)  # an export holds no second forms of the loop
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "run.so"
         try:
-            texts, flags = {"run.c": LIBRARY.text()}, ("-shared", "-fPIC")
+            texts, flags = {"run.c": exported.text()}, ("-shared", "-fPIC")
             made = compiler.compile_files(texts, path.name, "this machine", flags, command=[command])
             path.write_bytes(made)
             with LIBRARY.borrowed(path):

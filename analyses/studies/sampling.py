@@ -16,11 +16,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.special import ndtr, ndtri
 
-from actuator_lti.asked.quantities import with_unit
 from actuator_lti.bounds import CSV_COLUMNS, TABLE_BYTES, TABLE_ROWS
-from actuator_lti.design.fields import Structure, field_of
+from actuator_lti.design.fields import field_of
 from actuator_lti.design.model import Design, Tolerance
 from actuator_lti.design.tolerances import drawn, together
+from actuator_lti.design.writing import value_as_stated
 from actuator_lti.errors import InputError
 from actuator_lti.files.reading import read_bytes, shown, shown_path
 from actuator_lti.start.extras import need
@@ -204,7 +204,7 @@ def sampler_of(design: Design, *, seed: int = 0, table: Table | None = None) -> 
     for factor in factors:
         allowed, ends = field_of(factor.path), factor.quantile(np.array([_HALF_STEP, 1.0 - _HALF_STEP]))
         if allowed is not None and not all(allowed.accepts(float(end)) for end in ends):
-            end = with_unit(float(ends[0]), allowed.unit(Structure.of(design)))
+            end = value_as_stated(design, factor.path, float(ends[0]))
             said = f"{factor.path}: its {factor.tolerance.kind} tolerance reaches {end}, not allowed"
             raise InputError(f'{said}; take kind "truncated-normal" with lower and upper', where=where)
     names = [factor.path for factor in factors]

@@ -74,8 +74,9 @@ def _refuse_single(design: Design) -> None:
     if any((seen.current_noise_A, seen.angle_noise_rad, seen.output_angle_noise_rad, seen.jitter_s)):
         message = "instruments: noise and jitter need double precision; allowed: none of them"
     elif is_elastic(design):
-        message = "coupling, friction.point: an elastic drive train or a friction map needs double precision"
-        message += "; allowed: neither"
+        elastic = design.coupling is not None
+        key = "coupling: an elastic drive train" if elastic else "friction.point: a friction map"
+        message = f"{key} needs double precision; allowed: a design without it"
     if message:
         raise InputError(f"{message}, or no --single", where=design.origin or design.name)
 

@@ -7,12 +7,12 @@ of `actuator_lti.asked.drive_figure`.
 
 import math
 from collections.abc import Iterable
-from contextlib import suppress
 from dataclasses import dataclass
 
 from actuator_lti.design.access import located, parameter_value, paths_of
 from actuator_lti.design.field import Field, Structure
-from actuator_lti.design.model import Design, Parameter, Tolerance
+from actuator_lti.design.model import Design, Tolerance
+from actuator_lti.design.writing import unit_as_stated
 from actuator_lti.errors import InputError
 from actuator_lti.files.reading import Tree
 from nonlinear.export.page import changes_figure, changes_row, figure_statements
@@ -94,20 +94,10 @@ def _top(design: Design, path: str) -> float:
 def named(design: Design, path: str) -> Tree:
     """Give path, value and unit as the design file writes them."""
     field, value = located(design, path)[0], parameter_value(design, path)
-    unit = field.unit(Structure.of(design))
-    shown, factor = _written(design.parameters.get(path), value, unit)
+    shown, factor = unit_as_stated(design, path)
     shown, whole = "" if shown == "1" else shown, field.kind == "integer"
     about = {"path": path, "about": field.description, "value": value}
     return {**about, "unit": shown, "factor": factor, "whole": whole}
-
-
-def _written(known: Parameter | None, value: float, unit: str) -> tuple[str, float]:
-    """Give the unit in which a value is written, and SI over it."""
-    if known is not None and known.value == value != 0.0:
-        number, _, own = known.text.partition(" ")
-        with suppress(ValueError, ZeroDivisionError):
-            return own or unit, value / float(number) if own else 1.0
-    return unit, 1.0
 
 
 def _slider(design: Design, path: str) -> Tree:

@@ -4,7 +4,10 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
+import numpy as np
+
 from actuator_lti.asked.verdict import Verdict
+from actuator_lti.drive.operating import follows_angle, runs
 from analyses.duty.run import Duty
 from reports import document as doc
 from reports.charts import style
@@ -22,6 +25,8 @@ def section(result: Duty) -> doc.Section:
         "and drives the overload state."
     )
     note = f"Duty: {asked_words(result)}."
+    if runs(result.design) and follows_angle(result.design) and result.asked.share < 1.0:
+        note += " The load turns with the drive: this is one motion of many, which begin at other angles."
     if result.heating is None:
         note += " No winding temperature: the design states no temperature.thermal_resistance."
     if result.overload is None:
@@ -115,15 +120,18 @@ def _row(what: str, value: float, limit: float, unit: str, when: float | None = 
 
 def _figure(result: Duty) -> doc.Block:
     chart = style.Chart(width=style.WIDE, height=320.0)
-    panel = chart.panel(y="current, A", title="One period of the motion")
-    every, last = max(1, len(result.time_s) // _SHOWN), float(result.time_s[-1])
-    scale = style.time_axis(panel, last)
-    panel.curve(result.time_s[::every] * scale, result.current_A[::every], "current", **style.series(0))
+    panel, rows = chart.panel(y="current, A", title="One period of the motion"), result.period_ticks
+    every, last = max(1, rows // _SHOWN), float(result.time_s[rows - 1])
+    scale, first = style.time_axis(panel, last), int(np.argmax(np.abs(result.current_A))) // rows * rows
+    current = result.current_A[first : first + rows : every]
+    panel.curve(result.time_s[:rows:every] * scale, current, "current", **style.series(0))
     panel.rule_y(result.rms_A, "rms of the duty", seen=True, colour=style.BLUE, dash=1)
     if math.isfinite(result.continuous_A):
         panel.rule_y(result.continuous_A, "continuous", seen=True, colour=style.RED, dash=2)
     panel.x.limits(0.0, last * scale)
-    caption = "Motor current over one period of the motion."
+    caption, periods = "Motor current over one period of the motion", len(result.time_s) // rows
+    caption += f", the largest of {periods}, which come nearest to whole turns of the load" * (periods > 1)
+    caption += "."
     if result.heating is not None:
         caption += " Right: the winding from ambient."
         panel, heat = chart.panel(y="winding, °C", title="Winding"), result.heating

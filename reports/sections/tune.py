@@ -4,10 +4,8 @@ from pathlib import Path
 
 from actuator_lti.asked.quantities import with_unit
 from actuator_lti.asked.verdict import Verdict
-from actuator_lti.design.access import located
-from actuator_lti.design.fields import Structure
 from actuator_lti.design.model import Design
-from actuator_lti.design.writing import write_changed
+from actuator_lti.design.writing import value_as_stated, write_changed
 from actuator_lti.files.atomic import write_text
 from analyses.tuning.result import BindingRequirement, TuningResult
 from reports import document as doc
@@ -90,8 +88,7 @@ def _at_limit(r: BindingRequirement) -> bool:
 
 
 def _verdict(r: BindingRequirement, design: Design) -> doc.VerdictItem:
-    units = {path: located(design, path)[0].unit(Structure.of(design)) for path in r.corner}
-    said = (f"{path} {with_unit(value, units[path], '.4g')}" for path, value in r.corner.items())
+    said = (f"{path} {value_as_stated(design, path, value)}" for path, value in r.corner.items())
     corner = "; ".join(said) or "nominal"
     reason = [_amount(r)] * (r.distance is None) + ["binds"] * r.binds + [f"at {corner}"]
     return doc.verdict(

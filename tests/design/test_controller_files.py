@@ -167,6 +167,53 @@ def test_numbers_that_say_nothing_are_left_and_said(text: str, key: str, tmp_pat
     assert any(note.endswith(f"not taken, control.{key} stays as it is") for note in result.notes)
 
 
+@pytest.mark.parametrize(("text", "kept"), [
+    (ODRIVE, ()),
+    (VESC, ("integral_time", "derivative_time", "derivative_filter", "friction_feedforward")),
+    (SIMPLEFOC, ()),
+    (SIMPLEFOC + "motor.P_angle.I = 40; motor.P_angle.D = 0.2;", ("integral_time", "derivative_time")),
+])  # fmt: skip
+def test_what_no_such_controller_has_goes(text: str, kept: tuple[str, ...], tmp_path: Path) -> None:
+    """A position controller that is a P alone, as SimpleFOC's is until its I and D are set; no notch."""
+    base = with_overrides(BASE, PID | {
+        "control.position.derivative_filter": "1 ms", "control.position.friction_feedforward": "0.1 A",
+        "control.velocity.filter": [{"kind": "notch", "frequency": "90 Hz", "width": "20 Hz"}],
+    })  # fmt: skip
+    result = taken(tmp_path, text, base)
+    loop = result.design.controller.position
+    assert result.design.controller.velocity.filters == ()
+    assert result.notes.count("control.velocity.filter is left out: no such controller has it") == 1
+    for key, value in (("integral_time", loop.integral_time_s), ("derivative_time", loop.derivative_time_s),
+                       ("derivative_filter", loop.derivative_filter_s),
+                       ("friction_feedforward", loop.friction_feedforward)):  # fmt: skip
+        assert bool(value) == (key in kept)
+        gone = any(f"control.position.{key} is left out" in note for note in result.notes)
+        assert gone == (key not in kept)
+    if "P_angle.I" in text:  # speed = 20 e + 40 int e + 0.2 de/dt
+        assert (loop.integral_time_s, loop.derivative_time_s) == pytest.approx((20 / 40, 0.2 / 20))
+
+
+def test_a_rated_current_above_the_drives_is_lowered(tmp_path: Path) -> None:
+    """The drive gives no more than its limit for any time, so the motor's rating is never reached."""
+    base = with_overrides(BASE, {"limits.continuous_current": "1 A", "limits.peak_current": "2 A"})
+    result = taken(tmp_path, SIMPLEFOC + "motor.current_limit = 0.9;", base)
+    limits = result.design.limits
+    assert limits.continuous_current_A == limits.peak_current_A == pytest.approx(PEAK * 0.9)
+    assert "limits.continuous_current: 1 A dc is lowered to limits.peak_current" in result.notes
+    same = taken(tmp_path, SIMPLEFOC + "motor.current_limit = 1.5;", base)
+    assert same.design.limits.continuous_current_A == 1.0
+
+
+@pytest.mark.parametrize(("text", "stage", "words"), [
+    (VESC, "velocity", "control.velocity.gain is of settings: s_pid_kp = 0.004, l_current_max = 60"),
+    (EPOS + "\n[3001sub1]\nParameterValue=7000", "velocity",
+     "limits.peak_current is of settings: 0x3001.02 = 6000"),
+])  # fmt: skip
+def test_a_refusal_tells_what_the_file_brought(text: str, stage: str, words: str, tmp_path: Path) -> None:
+    """A base that fits by itself is not to blame: a new stage, a limit of the file."""
+    refused(taken, tmp_path, text, without(stage), match=words)
+
+
 LIMITS = {"encoder.filter_time": "1 ms", "limits.current_rate": "1 A/s"}
 PID = {"control.position.integral_time": "1 s", "control.position.derivative_time": "1 s"}
 

@@ -20,13 +20,14 @@ from actuator_lti.design import (
 from actuator_lti.design.key_reference import explained
 from actuator_lti.design.loader import design_from_tree
 from actuator_lti.design.model import Gear
-from actuator_lti.design.writing import read_value
+from actuator_lti.design.writing import read_value, value_as_stated
 from actuator_lti.drive.facts import capability, steady_torque_Nm
 from actuator_lti.drive.sheet_figures import sheet_figures
 from actuator_lti.errors import InputError, Mistakes
 from analyses.linear.loop_survey import survey_loops
 from analyses.studies.sampling import sampler_of
 from nonlinear import commands, simulate
+from reports.live.keys import named
 from reports.sections import forms
 from tests.changed import changed
 from tests.refusals import refused
@@ -639,3 +640,17 @@ def test_speed_and_force_of_a_linear_axis_behind_gears_are_those_of_the_output()
         assert told[force] == pytest.approx(
             motor.torque_constant_Nm_A * N * U / motor.resistance_ohm, rel=1e-12
         )
+
+
+@pytest.mark.parametrize(("key", "stated", "half", "words"), [
+    ("motor.rotor_inertia", "9.2 g*cm^2", 4.6e-7, "4.6 g cm^2"),
+    ("friction.breakaway_ratio", "2", 1.0, "1"),
+    ("motor.back_emf_constant", "1618.5 rpm/V", 0.00295, "0.00295 V s/rad"),  # half of it is twice the rpm/V
+])  # fmt: skip
+def test_a_value_is_told_in_the_unit_of_its_sheet(key: str, stated: str, half: float, words: str) -> None:
+    """A worst corner, a slider can be held against the file; what is turned over is not to be scaled."""
+    drive = with_overrides(AMBER, {key: stated})
+    value = 0.5 * parameter_value(drive, key)
+    assert value == pytest.approx(half, rel=1e-4)
+    assert value_as_stated(drive, key, value) == words
+    assert value / named(drive, key)["factor"] == pytest.approx(float(words.split()[0]), rel=1e-4)

@@ -4,6 +4,7 @@ import hashlib
 import re
 import shutil
 import sys
+from collections.abc import Callable
 from dataclasses import replace
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -32,11 +33,18 @@ def block(title: str, language: str, number: int = 0) -> str:
     return re.findall(rf"(?ms)^```{language}\n(.*?)^```", PARTS[title])[number]
 
 
-def exported(folder: Path, title: str) -> None:
-    for line in block(title, "sh").splitlines():
-        words = line.split()
-        assert words[0] == "actuator-lti"
-        ran(folder, sys.executable, "-m", "reports.cli", *words[1:])
+@pytest.fixture
+def exported(tmp_path: Path, monkeypatch, cli) -> Callable[[str], None]:
+    """Run the commands of a part of the page in the folder of the test."""
+
+    def call(title: str) -> None:
+        monkeypatch.chdir(tmp_path)
+        for line in block(title, "sh").splitlines():
+            program, *words = line.split()
+            assert program == "actuator-lti"
+            cli.text(*words)
+
+    return call
 
 
 def compiled(folder: Path, title: str, *files: str) -> str:
@@ -55,15 +63,15 @@ def truth() -> float:
 
 
 @needs_compiler
-def test_the_host_in_c_has_the_bits_of_the_simulator(truth: float, tmp_path: Path) -> None:
-    exported(tmp_path, "C")
+def test_the_host_in_c_has_the_bits_of_the_simulator(truth: float, tmp_path: Path, exported) -> None:
+    exported("C")
     assert float(compiled(tmp_path, "C", "drive.c", "drive_design.c")) == truth
 
 
 @needs_compiler
-def test_two_designs_in_one_program_each_have_the_bits_of_the_simulator(tmp_path: Path) -> None:
+def test_two_designs_in_one_program_each_have_the_bits_of_the_simulator(tmp_path: Path, exported) -> None:
     title = "Several designs in one program"
-    exported(tmp_path, title)
+    exported(title)
     files = ("worm/drive.c", "worm/worm_design.c", "soft/soft_design.c")
     lines = compiled(tmp_path, title, "-Iworm", "-Isoft", *files).splitlines()
     for column, (name, size) in enumerate((("ilr33-amber", 0.01), ("ilr33-amber-compliant", 0.02))):
@@ -72,9 +80,9 @@ def test_two_designs_in_one_program_each_have_the_bits_of_the_simulator(tmp_path
 
 
 @needs_compiler
-def test_the_host_of_the_unit(truth: float, tmp_path: Path) -> None:
+def test_the_host_of_the_unit(truth: float, tmp_path: Path, exported) -> None:
     pytest.importorskip("fmpy", reason="FMPy is not installed (pip install 'actuator-lti[export]')")
-    exported(tmp_path, "The unit")
+    exported("The unit")
     host = ran(tmp_path, sys.executable, "-c", block("The unit", "python"))
     assert float(host) == pytest.approx(truth, rel=1e-9)
 
@@ -93,8 +101,8 @@ def test_the_host_of_the_module(language: str, truth: float, tmp_path: Path) -> 
 
 
 @needs_compiler
-def test_the_controller_s_first_step(tmp_path: Path) -> None:
-    exported(tmp_path, "The controller alone")
+def test_the_controller_s_first_step(tmp_path: Path, exported) -> None:
+    exported("The controller alone")
     voltage, at_limit = compiled(tmp_path, "The controller alone", "controller.c").split()
     drive = Drive(load_design("ilr33-amber"))
     assert float(voltage) == drive.control(0.01, 0.0, 0.0, 0.0)

@@ -29,7 +29,6 @@ from analyses.studies.engine import Engine
 from analyses.studies.study import load_study
 
 LOST = 3  # the scheduler, said in one line
-SEEDS = 6  # studies that differ
 VICTIMS = ("client", "client", "worker", "worker", "scheduler")
 ENDS = {"client": (0, -signal.SIGKILL), "worker": (0,), "scheduler": (0, LOST)}
 SWEEP = """[study]
@@ -37,32 +36,32 @@ base = "ctms-motor-position"
 [[sweep]]
 parameter = "control.position.gain"
 from = "9 V/rad"
-to = "%d V/rad"
+to = "15 V/rad"
 points = 8
 """
 
 
-def kept(folder: Path, seed: int, engine: Engine) -> object:
+def kept(folder: Path, engine: Engine) -> object:
     """A study of which every sample is kept."""
-    asked = MonteCarloSettings(samples=1000, seed=seed, chunk=25, worst_cases=False)
+    asked = MonteCarloSettings(samples=1000, chunk=25, worst_cases=False)
     made = monte_carlo(load_design("ilr33-amber"), folder, asked, engine=engine)
     return made.odds, made.columns, made.nominal, made.drivers
 
 
-def reduced(folder: Path, seed: int, engine: Engine) -> object:
+def reduced(folder: Path, engine: Engine) -> object:
     """A study whose samples are reduced on the workers."""
     run.KEPT, run.BLOCK, run.NOTED_S = 999, 50, 0.05
-    return kept(folder, seed, engine)
+    return kept(folder, engine)
 
 
-def compared(folder: Path, seed: int, engine: Engine) -> object:
+def compared(folder: Path, engine: Engine) -> object:
     plan = folder.with_suffix(".toml")
-    plan.write_text(SWEEP % (15 + seed))
+    plan.write_text(SWEEP)
     found = compare(load_study(plan), engine=engine, folder=folder)
     return [(one.figures, one.verdicts, one.differences) for one in found.all]
 
 
-STUDIES: tuple[Callable[[Path, int, Engine], object], ...] = (kept, reduced, compared)
+STUDIES: tuple[Callable[[Path, Engine], object], ...] = (kept, reduced, compared)
 
 
 class Cluster:
@@ -121,7 +120,7 @@ def child(number: int, folder: Path, engine: Engine) -> int:
     if process == 0:
         status = 1
         try:
-            found = repr(STUDIES[number % len(STUDIES)](folder, number // len(STUDIES), engine))
+            found = repr(STUDIES[number % len(STUDIES)](folder, engine))
             folder.with_suffix(".found").write_text(found.replace(str(folder), ""))
             status = 0
         except NumericalError as error:
@@ -171,11 +170,11 @@ def undisturbed(number: int, top: Path, cluster: Cluster) -> tuple[dict[str, byt
 def one_study(number: int, top: Path, cluster: Cluster, draw: random.Random) -> Iterator[str]:
     """Disturb one study until it has ended; whom each kill met while the study ran."""
     cluster.start()
-    (plain, usual_s), folder = undisturbed(number % SEEDS, top, cluster), top / f"study-{number}"
+    (plain, usual_s), folder = undisturbed(number % len(STUDIES), top, cluster), top / f"study-{number}"
     status = None
     while status != 0:
         cluster.start()
-        process = child(number % SEEDS, folder, Engine(scheduler=cluster.address))
+        process = child(number, folder, Engine(scheduler=cluster.address))
         time.sleep(draw.uniform(0.0, usual_s))
         victim = draw.choice(VICTIMS)
         if os.waitpid(process, os.WNOHANG) != (0, 0):

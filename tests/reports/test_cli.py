@@ -137,7 +137,7 @@ def test_margins_on_the_terminal_name_every_loop(form: str, cli) -> None:
     ("export linear emps --to mat --out x.json", "--out 'x.json': --to is mat; allowed: a name that"),
     ("export linear emps --out x.mat", "ends in .json"),
     ("export c no-such-design --out out", "no such design; allowed: "),
-    ("export c fin --single --out out", "an elastic drive train or a friction map needs double precision"),
+    ("export c fin --single --out out", "coupling: an elastic drive train needs double precision"),
     ("simulate --command sine --frequency 5000", "below the Nyquist frequency"),
     ("simulate --duration 0.00001", "at least one tick"),
     ("simulate --duration nan", "finite"),

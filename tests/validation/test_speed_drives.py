@@ -7,9 +7,10 @@ from math import pi, sqrt
 import numpy as np
 import pytest
 from scipy.linalg import expm
+from scipy.signal import lfilter
 
 from actuator_lti.design import load_design, read_design_text
-from actuator_lti.design.model import Command
+from actuator_lti.design.model import Command, Gravity
 from actuator_lti.design.writing import write_design
 from actuator_lti.errors import InputError, UnstableError
 from analyses.duty import Asked as AskedDuty
@@ -56,6 +57,25 @@ def test_a_trapezoid_of_speed_is_inertia_and_friction() -> None:
     assert "0 to 11.5 deg/s and back in 250 ms each, at 0.5 Hz under 0 N m" in made["result"]
     rows = {row["what"]: row["value"] for row in made["blocks"][0]["rows"]}
     assert rows["power from the supply, mean"] == result.mean_power_W
+
+
+def test_a_load_that_turns_with_its_drive_counts_at_every_angle() -> None:
+    """A pendulum adds (G/N)^2/2 to the mean square of the torque, whatever angle a period begins at."""
+    G, asked = 16.0, {"speed_rad_s": 0.37, "ramp_s": 0.25, "frequency_hz": 0.5, "load_Nm": 0.0}
+    level = changed(SPINDLE, load={"path": "back-drivable"}, friction={"load_coefficient": 0.0})
+    swung = changed(level, load={"gravity": Gravity(mass_kg=G / 9.80665, arm_m=1.0)})
+    flat, turning = (duty(each, AskedDuty.of(each, **asked)) for each in (level, swung))
+    wanted = sqrt(flat.rms_torque_Nm**2 + 0.5 * (G / N) ** 2)
+    assert wanted > 1.1 * flat.rms_torque_Nm
+    assert turning.rms_torque_Nm == pytest.approx(wanted, rel=0.01)
+    assert turning.mean_power_W == pytest.approx(flat.shaft_W + R * (wanted / kM) ** 2, rel=0.01)
+    protected = changed(swung, limits={"continuous_current_A": 0.9 * turning.rms_A, "peak_time_s": 0.4})
+    found, Ts = duty(protected, AskedDuty.of(protected, **asked)), SPINDLE.controller.period_s
+    a = Ts / protected.limits.overload_time_s
+    drive = np.tile((found.current_A / (0.9 * turning.rms_A)) ** 2, 3)
+    first = np.argmax(lfilter([a], [1.0, a - 1.0], drive) >= 1.0) * Ts
+    assert 2.0 < first < found.overload.acts_after_s <= first + 2.0  # to the end of a period of 2 s
+    assert "whole turns of the load" in duty_section(turning)["blocks"][-1]["caption"]
 
 
 def test_a_speed_drive_runs_up_by_half_its_torque_against_the_load_and_rests() -> None:
