@@ -17,18 +17,23 @@ PLACES = 16  # a current turns where its voltage is switched: a search stays bet
 ROUNDS = 3
 
 
-def signals_at(design: Design, run: Trajectory, time_s: Floats, later_s: float = 0.0) -> dict[str, Floats]:
+def signals_at(
+    design: Design, run: Trajectory, time_s: Floats, later_s: float | None = None
+) -> dict[str, Floats]:
     """The signals of a run ``later_s`` after some times, under the names of a record.
 
-    The voltage is that of the last tick before the times themselves.
+    The voltage is that of the last tick before the times themselves. Without ``later_s`` it is not known
+    when the ticks are: all signals are in straight lines between them.
     """
-    (tick, late), (at, _) = (_placed(run, time_s + more) for more in (later_s, 0.0))
+    (tick, late), (at, _) = (_placed(run, time_s + more) for more in (later_s or 0.0, 0.0))
     rate, ratio, voltage = run.output_speed_rad_s, design.total_ratio, run.voltage_V[at]
     speed = run.motor_speed_rad_s / ratio if rate is None else rate
     columns = (run.motor_angle_rad, run.motor_speed_rad_s, run.current_A, run.output_angle_rad, speed)
     after, share = np.minimum(tick + 1, len(run.time_s) - 1), late / run.period_s
     made = np.array([one[tick] + share * (one[after] - one[tick]) for one in columns])
-    if np.any(late):
+    if later_s is None:
+        voltage = voltage + share * (run.voltage_V[after] - voltage)
+    elif np.any(late):
         bent = _bent(design, run, tick, late)
         made[:3] += bent
         made[3:] += bent[:2] / ratio if rate is None else 0.0

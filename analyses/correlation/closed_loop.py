@@ -235,8 +235,9 @@ def _with_steps(
     after the later sample (written before it acts) to the earlier one.
     """
     tick, early = driven.design.controller.period_s, driven.likely_s
+    ticks = None if driven.hold is None else 0.0
     made = run(early)
-    series = signals_at(driven.design, made, time)
+    series = signals_at(driven.design, made, time, ticks)
     name = next((name for name in ANSWERS if name in measured), "")
     for _ in range(STEP_ROUNDS if driven.early_s is None and len(early) and name else 0):
         least, most = _more_ticks(driven, time, early)
@@ -245,14 +246,14 @@ def _with_steps(
         if np.array_equal(moved, early):
             break
         other = run(moved)
-        if _off(measured, nearer := signals_at(driven.design, other, time)) >= _off(measured, series):
+        if _off(measured, nearer := signals_at(driven.design, other, time, ticks)) >= _off(measured, series):
             break
         early, made, series = moved, other, nearer
     if driven.hold is not None and not driven.hold.is_whole:
         ends = driven.hold.more_s(early)
         if driven.early_s is None:
             later = likeliest_s(driven.design, made, time, measured, ends)
-            early, series = early + later, signals_at(driven.design, made, time + later)
+            early, series = early + later, signals_at(driven.design, made, time + later, ticks)
         else:  # what was found may be a little beyond the ends, but no row sees another voltage
             inside = float(np.clip(0.0, *ends))
             series = signals_at(driven.design, made, time + inside, -inside)

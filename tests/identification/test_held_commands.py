@@ -172,7 +172,7 @@ def test_a_run_is_known_between_its_ticks() -> None:
     run = simulate(bare, commands.events(ticks, volts), ticks[-1])
     other = simulate(fine, commands.events(ticks, volts), ticks[-1])
     part = slice(coarse, -2 * coarse)
-    seen = signals_at(bare, run, other.time_s[part])
+    seen = signals_at(bare, run, other.time_s[part], 0.0)
     truth = {"angle": other.motor_angle_rad, "speed": other.motor_speed_rad_s, "current": other.current_A}
     for name, values in truth.items():
         assert seen[name] == pytest.approx(values[part], abs=1e-6 * np.ptp(values)), name
