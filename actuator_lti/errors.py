@@ -94,15 +94,11 @@ def finite_number(name: str, value: Any, allowed: str = "a finite number, in SI"
     return number
 
 
-def instance_of(name: str, value: Any, kind: type) -> None:
-    """Refuse an argument that is nothing of a kind.
-
-    >>> instance_of("values", 5, dict)
-    Traceback (most recent call last):
-    actuator_lti.errors.InputError: values = 5: must be a dict
-    """
-    if not isinstance(value, kind):
-        raise InputError(f"{name} = {shown(value)}: must be a {kind.__name__}")
+def positive_number(name: str, value: Any) -> float:
+    """An argument that is one finite number above 0."""
+    if (number := finite_number(name, value, allowed := "positive and finite, in SI")) <= 0.0:
+        raise InputError(f"{name} = {shown(value)}: must be {allowed}")
+    return number
 
 
 def delay_number(delay_s: Any) -> float:
@@ -123,19 +119,6 @@ def whole_number(name: str, value: Any, least: int = 1) -> int:
     if not isinstance(value, Integral) or value < least:
         raise InputError(f"{name} = {shown(value)}: must be a whole number, at least {least}")
     return int(value)
-
-
-def whole_numbers(name: str, values: Any, many: int, least: int = 1) -> tuple[int, ...]:
-    """An argument that is so many whole numbers from ``least`` on.
-
-    >>> whole_numbers("counts", 5, 2)
-    Traceback (most recent call last):
-    actuator_lti.errors.InputError: counts = 5: must be 2 whole numbers, at least 1
-    """
-    given = values if isinstance(values, Sequence) and len(values) == many else ()
-    if not given or not all(isinstance(one, Integral) and int(one) >= least for one in given):
-        raise InputError(f"{name} = {shown(values)}: must be {many} whole numbers, at least {least}")
-    return tuple(map(int, given))
 
 
 _SHORT = Repr()

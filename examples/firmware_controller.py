@@ -24,7 +24,7 @@ import numpy as np
 from actuator_lti import load_design
 from actuator_lti.compiled.compiler import compile_files
 from actuator_lti.design.model import Command, Design, Encoder, Instruments, Limits
-from nonlinear.drive import Drive
+from nonlinear import Drive
 from nonlinear.export import controller_export
 from nonlinear.row.elastic import is_elastic
 

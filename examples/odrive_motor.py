@@ -20,10 +20,10 @@ from scipy.optimize import least_squares
 
 from actuator_lti.errors import InputError, NumericalError
 from actuator_lti.types import Floats
+from analyses import open_record
 from analyses.correlation.compare import SignalComparison, compare_signals
 from analyses.estimation.fit import Fit
 from analyses.estimation.least_squares import by_record, correlated_covariance
-from analyses.records.open_record import open_record
 from analyses.records.record import Record
 
 ESTIMATOR_RAD_S = 1000.0

@@ -18,7 +18,8 @@ import numpy as np
 import numpy.typing as npt
 
 from actuator_lti.bounds import SIGNAL_ROWS, TONE_TICKS, TONES, Bound
-from actuator_lti.errors import InputError, finite_number, shown, whole_number
+from actuator_lti.errors import InputError, finite_number, positive_number, shown, whole_number
+from actuator_lti.start.border import guard
 from actuator_lti.types import Floats, number_array
 from nonlinear._kernels import layout as at
 from nonlinear.native import fill
@@ -126,10 +127,8 @@ def _finite(kind: str, **values: float) -> None:
 
 
 def _positive(kind: str, **values: float) -> None:
-    _finite(kind, **values)
     for name, value in values.items():
-        if value <= 0.0:
-            raise InputError(f"command {kind}: {name} = {value}: must be positive")
+        positive_number(f"command {kind}: {name}", value)
 
 
 def numbers_of(name: str, given: npt.ArrayLike) -> Floats:
@@ -416,3 +415,6 @@ def recorded(
         raise InputError(message, where=str(path))
     times, angles = read_columns(path, (time_column, angle_column), delimiter)
     return (events if held else sampled)(times, angles * scale, where=str(path))
+
+
+guard(__name__)

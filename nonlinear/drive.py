@@ -7,6 +7,7 @@ import numpy as np
 
 from actuator_lti.design.loader import AnyDesign, as_design
 from actuator_lti.errors import InputError, NumericalError, finite_number, shown
+from actuator_lti.start.border import asked
 from actuator_lti.types import Floats
 from nonlinear._kernels import layout as at
 from nonlinear.commands import numbers_of
@@ -30,6 +31,7 @@ def _check(**given: float) -> None:
         finite_number(name, value)
 
 
+@asked
 class Drive:
     """A drive with its whole state in one array of floats.
 

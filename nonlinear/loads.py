@@ -9,11 +9,13 @@ from dataclasses import dataclass
 import numpy.typing as npt
 
 from actuator_lti.errors import finite_number
+from actuator_lti.start.border import asked, guard
 from nonlinear.commands import Command, on_its_clock
 
 __all__ = ["LoadMoment", "constant", "proportional", "series"]
 
 
+@asked
 @dataclass(frozen=True)
 class LoadMoment:
     """``M = constant + slope * output angle + series(t)`` in N m (N on a linear axis)."""
@@ -21,6 +23,10 @@ class LoadMoment:
     constant_Nm: float = 0.0
     slope_Nm_rad: float = 0.0
     series: Command | None = None
+
+    def __post_init__(self) -> None:
+        for name in ("constant_Nm", "slope_Nm_rad"):
+            finite_number(name, getattr(self, name))
 
 
 def constant(moment_Nm: float) -> LoadMoment:
@@ -40,3 +46,6 @@ def series(time_s: npt.ArrayLike, moment_Nm: npt.ArrayLike, where: str = "load s
     Times count from the beginning of the run: before the first of them there is no load.
     """
     return LoadMoment(series=on_its_clock(time_s, moment_Nm, where=where))
+
+
+guard(__name__)

@@ -11,6 +11,7 @@ import numpy as np
 
 from actuator_lti.design.access import located, paths_of, stacked
 from actuator_lti.errors import InputError
+from actuator_lti.start.border import asked
 from actuator_lti.systems.sampling import split_delay
 
 if TYPE_CHECKING:
@@ -29,6 +30,7 @@ def variable_paths(design: Design) -> tuple[str, ...]:
     )
 
 
+@asked
 @dataclass(frozen=True)
 class Population:
     """Many designs of one structure: a nominal design and, for some keys, an array of SI values."""

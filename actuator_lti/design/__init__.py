@@ -17,9 +17,12 @@ from actuator_lti.design.plant import no_load_speed
 from actuator_lti.design.suspicions import warnings_of
 from actuator_lti.design.tolerances import tolerances
 from actuator_lti.design.writing import design_hash, design_tree, with_overrides, write_design
+from actuator_lti.start.border import guard
 
 __all__ = [
     "FIELDS", "QUANTITIES", "Design", "SweepPoint", "as_design", "check_design", "design_hash", "design_tree",
     "load_design", "no_load_speed", "parameter_value", "paths_of", "read_design_text", "shipped_designs",
     "sweep", "tolerances", "warnings_of", "with_overrides", "with_values", "write_design"
 ]  # fmt: skip
+
+guard(__name__)

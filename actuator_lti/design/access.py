@@ -12,7 +12,7 @@ from actuator_lti.design.mistakes import nearest
 from actuator_lti.design.model import Design
 from actuator_lti.design.tolerances import rescaled
 from actuator_lti.design.units import ampere_unit, si_text
-from actuator_lti.errors import InputError, instance_of
+from actuator_lti.errors import InputError
 from actuator_lti.files.reading import shown
 
 
@@ -74,7 +74,6 @@ def with_values(design: Design, values: Mapping[str, float], *, check: bool = Tr
     >>> with_values(load_design("ilr33-amber"), {"motor.resistance": 0.06}).motor.resistance_ohm
     0.06
     """
-    instance_of("values", values, Mapping)
     parameters = {path: _changed(design, path, value) for path, value in values.items()}
     gone = {path for path, item in parameters.items() if item.tolerance is None}
     changed = replace(

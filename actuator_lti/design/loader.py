@@ -90,8 +90,6 @@ def read_design_text(text: str, origin: str = "design", folder: Path = Path()) -
 
     Raises `InputError`: as :func:`load_design`.
     """
-    if not isinstance(text, str):
-        raise InputError(f"text = {shown(text)}: allowed: the text of a design file", where=origin)
     if tree := parse_toml(text, origin):
         return design_from_tree(tree, origin, Findings(origin, lines_of(text, tree), folder))
     raise InputError("is empty; allowed: a design file (actuator-lti init writes one)", where=origin)
@@ -130,6 +128,4 @@ def sweep(design: AnyDesign, path: str, values: Iterable[Any]) -> tuple[SweepPoi
     [('12 V', 12.0), (14.0, 14.0)]
     """
     base = load_design(design)
-    if isinstance(values, str) or not isinstance(values, Iterable):
-        raise InputError(f"values = {shown(values)}: allowed: several, such as [12.0, 14.0]")
     return tuple(SweepPoint(value, base.with_values({path: value})) for value in values)

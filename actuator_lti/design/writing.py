@@ -26,7 +26,7 @@ from actuator_lti.design.settings_file import object_entry
 from actuator_lti.design.spellings import split_quantity
 from actuator_lti.design.tolerances import tolerances
 from actuator_lti.design.units import ampere_unit, si_text
-from actuator_lti.errors import InputError, instance_of
+from actuator_lti.errors import InputError
 from actuator_lti.files.reading import Tree, parse_toml, shown
 
 _WHICH = ("rotor", "to", "locking_gear", "law", "continuous")  # mostly not said
@@ -151,8 +151,6 @@ def with_overrides(design: Design, overrides: Mapping[str, Any]) -> Design:
     "gear.worm.ratio": 40}``.  A number replaces the value and drops its source; a table the whole entry;
     None takes the key away. An InputError as of :func:`load_design`, also for an unknown key.
     """
-    instance_of("design", design, Design)
-    instance_of("overrides", overrides, Mapping)
     tree = design_tree(design)
     as_stated(tree, overrides)
     for path, value in overrides.items():

@@ -16,10 +16,12 @@ import numpy as np
 
 from actuator_lti.bandwidth import closed_loop_bandwidth
 from actuator_lti.design.field import unit_on
-from actuator_lti.errors import InputError
+from actuator_lti.errors import InputError, positive_number, shown
 from actuator_lti.margins import stability_margins
+from actuator_lti.margins.given import given_of
 from actuator_lti.margins.measured.margins import measured_points
 from actuator_lti.measured.response import is_measured, measured_response, refuse_measured
+from actuator_lti.start.border import guard
 from actuator_lti.start.extras import need
 from actuator_lti.systems.phase import unwrapped_phase_deg
 from actuator_lti.systems.resolvent import apart_about_minus_one, refined
@@ -99,11 +101,24 @@ def response(system: Any, omega_rad_s: np.ndarray) -> np.ndarray:
     return np.asarray(system(np.exp(s * system.dt) if system.isdtime(strict=True) else s)).ravel()
 
 
+def _drawable(system: Any) -> Any:
+    """A system that python-control draws: of scipy.signal the same as its own; refused where it is none."""
+    if not hasattr(system, "delays_s"):
+        given = given_of(system)
+        if not hasattr(system, "isdtime"):
+            from control import ss, tf
+
+            parts = (getattr(given, name) for name in given.entries)
+            return (tf if given.A is None else ss)(*parts, given.period_s or 0)
+    return system
+
+
 def _curve(system: Any, margins: StabilityMargins | None = None) -> tuple[np.ndarray, np.ndarray]:
     """Frequencies that show a system and its response there; of measured data their own points."""
     if is_measured(system):
         omega, L, _ = measured_points(measured_response(system), None)
         return omega, L
+    system = _drawable(system)
     omega = frequencies(system, margins)
     return omega, response(system, omega)
 
@@ -180,7 +195,7 @@ def plot_nyquist(system: Any, *, label: str = "", axes: Any = None) -> Axes:
     (panel,) = _panels(axes, 1, figsize=(4.8, 4.8))
     omega, L = _curve(system)
     if not is_measured(system):
-        L = refined(partial(response, system), omega, partial(apart_about_minus_one, frame=2.0))[1]
+        L = refined(partial(response, _drawable(system)), omega, partial(apart_about_minus_one, frame=2.0))[1]
     turn = np.exp(1j * np.linspace(0.0, 2.0 * np.pi, 200))
     panel.plot(turn.real, turn.imag, color=MUTED, linewidth=0.8, linestyle="--")
     panel.plot(L.real, L.imag, label=label or None)
@@ -207,8 +222,7 @@ def plot_step(system: Any, *, duration_s: float | None = None, label: str = "", 
     if duration_s is None:
         result = closed_loop_bandwidth(system).minus3db_rad_s
         duration_s = 8.0 / result if result and np.isfinite(result) else 1.0
-    if not duration_s > 0.0:
-        raise InputError(f"duration_s = {duration_s}: must be positive")
+    duration_s, system = positive_number("duration_s", duration_s), _drawable(system)
     (panel,) = _panels(axes, 1)
     sampled = system.isdtime(strict=True)
     times = np.arange(0.0, duration_s, system.dt) if sampled else np.linspace(0.0, duration_s, _POINTS)
@@ -231,6 +245,8 @@ def plot_run(run: Any, axes: Any = None) -> list[Axes]:
 
     ``axes``: four of matplotlib's axes, see `nonlinear.Trajectory.plot`.
     """
+    if not hasattr(run, "reference_rad"):
+        raise InputError(f"run = {shown(run)}: must be a Trajectory, as nonlinear.simulate gives")
     angle, speed, current, voltage = _panels(axes, 4, figsize=(6.4, 7.2))
     factor, unit = _shown_angle(run.axis == "linear")
     scale, time_unit = (1e3, "ms") if run.time_s[-1] < 1.0 else (1.0, "s")
@@ -287,6 +303,9 @@ def plot_map(
     onset_rad: Mapping[str, np.ndarray] | None = None, linear_axis: bool = False, axes: Any = None
 ) -> Axes:  # fmt: skip
     """A map of amplitude and frequency: a colour for what acts at each point, lines for the linear onset."""
+    frequency_hz, amplitude_rad, kind = map(np.asarray, (frequency_hz, amplitude_rad, kind))
+    if kind.ndim != 2 or (amplitude_rad.shape, frequency_hz.shape) != (kind.shape[:1], kind.shape[1:]):
+        raise InputError("kind: must have a row for each of amplitude_rad, a column for each of frequency_hz")
     (panel,) = _panels(axes, 1)
     from matplotlib.colors import ListedColormap
     from matplotlib.patches import Patch
@@ -317,3 +336,6 @@ def _amplitude_axes(panel: Axes, linear_axis: bool) -> float:
 
 def _shown_angle(linear_axis: bool) -> tuple[float, str]:
     return (1e3, "mm") if linear_axis else (float(np.degrees(1.0)), "deg")
+
+
+guard(__name__)

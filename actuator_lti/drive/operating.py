@@ -10,11 +10,12 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from math import pi
-from typing import TYPE_CHECKING, Any, Literal, get_args
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
 from actuator_lti.errors import InputError, finite_number
+from actuator_lti.start.border import asked
 
 if TYPE_CHECKING:
     from actuator_lti.design.model import Design, FrictionPoint
@@ -24,6 +25,7 @@ RotorState = Literal["free", "locked"]
 CONTACT = {"driving": 1.0, "driven": -1.0, "sliding": 1.0}  # sgn(w T_s) of the load-dependent friction
 
 
+@asked
 @dataclass(frozen=True, kw_only=True)
 class Operating:
     """Where a drive stands when it is made linear (model.md sections 3 and 6)."""
@@ -50,14 +52,8 @@ class Operating:
 
     def __post_init__(self) -> None:
         """Refuse what is no operating point."""
-        if self.point not in get_args(OperatingPoint):
-            raise InputError(
-                f"operating_point = {self.point!r}: one of {', '.join(get_args(OperatingPoint))}"
-            )
         if self.direction not in (1, -1):
             raise InputError(f"direction = {self.direction!r}: 1 or -1")
-        if self.rotor not in get_args(RotorState):
-            raise InputError(f"rotor = {self.rotor!r}: free or locked")
         for name in ("load_Nm", "speed_rad_s", "angle_rad", "twist_rad"):
             finite_number(name, getattr(self, name))
         W, allowed = self.speed_amplitude_rad_s, "positive, in rad/s (motor side)"

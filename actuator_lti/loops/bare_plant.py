@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from os import PathLike
-from typing import TYPE_CHECKING, Any, Literal, get_args
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
@@ -63,9 +63,6 @@ def plant(
     (['u', 'load_torque'], ['current', 'speed', 'angle', 'output_angle', 'twist', 'output_speed'])
     """
     design = as_design(design)
-    for name, value, known in (("form", form, Form), ("command", command, PlantInput)):
-        if value not in get_args(known):
-            raise InputError(f"{name} = {value!r}: one of {', '.join(get_args(known))}")
     control = replace(design.controller, position=None, velocity=None)
     if command == "u":
         control = replace(control, current=None)

@@ -93,8 +93,8 @@ def _frequencies(omega_rad_s: Any) -> np.ndarray:
         omega = np.atleast_1d(number_array(omega_rad_s))
     except (TypeError, ValueError):
         omega = np.array([np.nan])
-    if not np.isfinite(omega).all():
-        raise InputError(f"omega_rad_s = {shown(omega_rad_s)}: allowed: finite numbers, in rad/s")
+    if omega.ndim > 1 or not np.isfinite(omega).all():
+        raise InputError(f"omega_rad_s = {shown(omega_rad_s)}: allowed: a row of finite numbers, in rad/s")
     return omega
 
 
@@ -104,10 +104,8 @@ def onset(loops: Loops, omega_rad_s: Any, bias: Mapping[str, float] | None = Non
     Of the command as the user gives it: its rate and acceleration limit (``"profile"``) and the mean of a
     limited jerk come before all other limiters.
     """
-    if not isinstance(loops, Loops):
-        raise InputError(f"loops = {shown(loops)}: allowed: what assemble_loops gives")
     used, known = {} if bias is None else bias, ", ".join(loops.limiters) or "none"
-    if not isinstance(used, Mapping) or not used.keys() <= loops.limiters.keys():
+    if not used.keys() <= loops.limiters.keys():
         raise InputError(f"bias = {shown(bias)}: allowed: numbers by the name of a limiter ({known})")
     used = {name: finite_number(f"bias[{name!r}]", value) for name, value in used.items()}
     omega = _frequencies(omega_rad_s)

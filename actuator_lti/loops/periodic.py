@@ -18,7 +18,7 @@ import numpy as np
 import numpy.typing as npt
 
 from actuator_lti.drive.wiring import Drive, wire
-from actuator_lti.errors import InputError
+from actuator_lti.errors import InputError, finite_number
 from actuator_lti.loops.result import Loops
 from actuator_lti.loops.tick import Block, TickProgram, mean_response, siso, used
 from actuator_lti.systems.resolvent import balanced
@@ -167,7 +167,13 @@ def _wired(loops: Loops) -> Drive:
 def periodic_loop(loops: Loops | Drive, point: str) -> PeriodicLoop:
     """The loop at a break point of sampled loops, or of a wired drive, what no gain moves left out."""
     wired = loops if isinstance(loops, Drive) else _wired(loops)
+    _refuse_unknown(wired, point)
     return _moved(_parts(point_blocks(wired, point))[0], wired.interval[wired.producer(point)] * wired.tick_s)
+
+
+def _refuse_unknown(wired: Drive, point: str) -> None:
+    if point not in wired.points:
+        raise InputError(f"break point {point!r}: one of {', '.join(wired.points)}")
 
 
 def _moved(systems: Sequence[System], dt: float) -> PeriodicLoop:
@@ -259,9 +265,8 @@ def exact_margins(loops: Loops, point: str, longest_delay_ticks: float = 50.0) -
     """
     if loops.form != "sampled":
         raise InputError(f"form = {loops.form!r}: exact_margins needs form='sampled'")
-    if point not in loops.break_points:
-        raise InputError(f"break point {point!r}: one of {', '.join(loops.break_points)}")
-    wired, asked = _wired(loops), (point, longest_delay_ticks)
+    wired, asked = _wired(loops), (point, finite_number("longest_delay_ticks", longest_delay_ticks))
+    _refuse_unknown(wired, point)
     if asked not in wired.margins_at:
         wired.margins_at[asked] = _margins_of(wired, *asked)
     found: ExactMargins = wired.margins_at[asked]

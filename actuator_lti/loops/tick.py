@@ -25,6 +25,7 @@ from actuator_lti.design.law import Law, Matrices
 from actuator_lti.drive import blocks as own
 from actuator_lti.loops.rows import Row, table, total
 from actuator_lti.loops.walk import INPUTS, Program, Walk
+from actuator_lti.systems.resolvent import LARGE, states_at
 from actuator_lti.systems.rest_mode import without_rest_mode
 
 
@@ -277,7 +278,22 @@ def mean_response(steps: Sequence[tuple[Any, ...]], z: np.ndarray) -> np.ndarray
     over, driven, power, total = np.eye(n), np.zeros((n, 1)), np.ones_like(z), 0.0
     for A, B, _, _ in steps:
         over, driven, power = A @ over, A @ driven + B * power, power * z
-    p = np.linalg.solve(power * np.eye(n) - over, driven)
+    p = _solved(over, driven, power)
     for A, B, C, D in steps:
         total, p = total + C @ p + D, (A @ p + B) / z
     return np.asarray(total / len(steps))
+
+
+def _solved(A: Any, right: np.ndarray, points: np.ndarray) -> np.ndarray:
+    """(p - A)^-1 right at points (..., 1, 1); of stacked designs with many states one after the other."""
+    n = A.shape[-1]
+    if n < LARGE:
+        return np.asarray(np.linalg.solve(points * np.eye(n) - A, right))
+    A, points = (np.broadcast_to(each, (*right.shape[:-2], *each.shape[-2:])) for each in (A, points))
+    parts = zip(
+        A[..., 0, :, :].reshape(-1, n, n),
+        right.reshape(-1, *right.shape[-3:]),
+        points.reshape(-1, points.shape[-3]),
+        strict=True,
+    )
+    return np.reshape([states_at(*each) for each in parts], right.shape)

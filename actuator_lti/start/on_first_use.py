@@ -5,11 +5,15 @@ from collections.abc import Callable, Collection, Mapping
 from importlib import import_module
 from typing import Any
 
+from actuator_lti.start.border import guarded
+
 
 def on_first_use(
     package: str, names: Mapping[str, str], modules: Collection[str] = ()
 ) -> tuple[Callable[[str], Any], Callable[[], list[str]]]:
     """What a package defines as ``__getattr__`` and ``__dir__``: the module that defines each public name.
+
+    Its functions look at their arguments there (`guarded`).
 
     ``modules`` are modules of the package that are public themselves. All these are its ``__all__``, which
     ``from package import *`` asks for.
@@ -26,7 +30,7 @@ def on_first_use(
             return import_module(f"{package}.{name}")
         if name not in names:
             raise AttributeError(f"module {package!r} has no attribute {name!r}")
-        value = getattr(import_module(names[name]), name)
+        value = guarded(getattr(import_module(names[name]), name), package)
         if package in sys.modules:
             setattr(sys.modules[package], name, value)
         return value

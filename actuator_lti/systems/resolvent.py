@@ -6,26 +6,47 @@ from typing import Any
 import numpy as np
 
 HALVED, MOST = 7, 3000  # times that an interval too long on paper is halved, and points at which that ends
+LARGE = 32  # states and points from which on a Schur form is quicker than to solve at each
 _ENTRIES = 1 << 15  # of the matrices solved in one call: what the cache holds
 
 
 def states_at(A: np.ndarray, B: np.ndarray, points: np.ndarray) -> np.ndarray:
-    """(p - A)^-1 B, shape (K, n, m), for A (n, n), B (n, m) and points (K,); NaN at a pole.
+    """(p - A)^-1 B, shape (K, n, m), for A (n, n), B (n, m) or (K, n, m) and points (K,); NaN at a pole.
 
     The states are scaled by powers of two first: of ones of very different size a small response, behind a
     soft spring say, would keep few digits.
     """
     A, scale = balanced(A)
-    B = B / scale[:, None]
-    result = np.empty((len(points), *B.shape), dtype=complex)
+    right = np.broadcast_to(B / scale[:, None], (len(points), *B.shape[-2:]))
+    if min(len(A), len(points)) >= LARGE and np.isfinite(A).all():
+        return _by_schur_form(A, right, points) * scale[:, None]
+    result = np.empty(right.shape, dtype=complex)
     own = np.arange(len(A))
     some = max(_ENTRIES // max(A.size, 1), 1)  # points at once
     for start in range(0, len(points), some):
         part = slice(start, start + some)
         matrix = np.repeat(-A.astype(complex)[None], len(points[part]), axis=0)
         matrix[:, own, own] += points[part, None]
-        result[part] = solved_at(matrix, np.broadcast_to(B, (len(matrix), *B.shape)))
+        result[part] = solved_at(matrix, right[part])
     return result * scale[:, None]
+
+
+def _by_schur_form(A: np.ndarray, right: np.ndarray, points: np.ndarray) -> np.ndarray:
+    """(p - A)^-1 right with A = Q T Q^H: n^2 operations a point for n^3. Refined once, as in `solved_at`."""
+    from scipy.linalg import schur
+
+    T, Q = schur(A, output="complex")
+
+    def solved(wanted: np.ndarray) -> np.ndarray:
+        x = Q.conj().T @ wanted
+        for row in reversed(range(len(A))):
+            x[:, row] += (T[row, None, row + 1 :] @ x[:, row + 1 :])[:, 0]
+            x[:, row] /= (points - T[row, row])[:, None]
+        return np.asarray(Q @ x)
+
+    with np.errstate(divide="ignore", invalid="ignore"):  # at a pole
+        found = solved(right)
+        return found + solved(right - (points[:, None, None] * found - A @ found))
 
 
 def balanced(A: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

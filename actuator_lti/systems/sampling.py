@@ -83,18 +83,19 @@ def _mild_exponential(M: np.ndarray, norm: np.ndarray) -> np.ndarray:
 def _scales(M: np.ndarray, rounds: int = 8) -> np.ndarray:
     """Powers of two d with rows and columns of D^-1 M D of like size (Parlett and Reinsch 1969), stacked."""
     off = np.abs(M) * (1 - np.eye(M.shape[-1]))
-    d = np.ones(M.shape[:-1])
-    for _ in range(rounds):
-        changed = False
-        for k in range(M.shape[-1]):
-            row = (off[..., k, :] * d).sum(-1) / d[..., k]
-            column = (off[..., :, k] / d).sum(-1) * d[..., k]
-            ratio = np.divide(row, column, out=np.ones_like(row), where=(row > 0) & (column > 0))
-            power = np.round(0.5 * np.log2(ratio))
-            if power.any():
-                d[..., k] *= 2.0**power
-                changed = True
-        if not changed:
+    d, still = np.ones(M.shape[:-1]), 0
+    tied = (off.sum(-1) > 0) & (off.sum(-2) > 0)  # to others both ways; nothing else is out of balance
+    places = np.flatnonzero(tied.reshape(-1, M.shape[-1]).any(0))
+    for k in np.tile(places, rounds):
+        row = np.add.reduce(off[..., k, :] * d, -1) / d[..., k]
+        column = np.add.reduce(off[..., :, k] / d, -1) * d[..., k]
+        ratio = np.divide(row, column, out=np.ones(row.shape), where=tied[..., k])
+        power = np.rint(0.5 * np.log2(ratio))
+        still += 1
+        if np.count_nonzero(power):
+            d[..., k] *= 2.0**power
+            still = 0
+        if still == places.size:
             break
     return d
 

@@ -7,6 +7,7 @@ from math import inf, isfinite
 from typing import TYPE_CHECKING, Annotated
 
 from actuator_lti.errors import InputError
+from actuator_lti.start.border import asked
 from analyses.request import Option, given
 
 if TYPE_CHECKING:
@@ -15,6 +16,7 @@ if TYPE_CHECKING:
 HOT_DEGC, COLD_DEGC, SUPPLY_SHARE = 120.0, -40.0, 0.8
 
 
+@asked
 @dataclass(frozen=True, kw_only=True)
 class Asked:
     """Judge the linear loops at the corners of the drive: hot, cold, low supply, worst tolerances.

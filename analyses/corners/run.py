@@ -13,7 +13,7 @@ from actuator_lti.design.checks import contradictions
 from actuator_lti.design.loader import AnyDesign, as_design
 from actuator_lti.design.model import Design, Requirement, Temperature, Tolerance
 from actuator_lti.design.tolerances import drawn, together
-from actuator_lti.errors import InputError, instance_of
+from actuator_lti.errors import InputError
 from actuator_lti.loops import assemble_loops
 from actuator_lti.types import Progress
 from analyses.corners.asked import Asked
@@ -24,7 +24,7 @@ from analyses.specification.requirements import (
     judged_nominally,
     tally,
 )
-from analyses.specification.sensitivity import moved, population_figures
+from analyses.specification.sensitivity import moved, population_loop_figures
 from analyses.studies.sampling import Factor
 
 
@@ -90,7 +90,6 @@ def corners(design: AnyDesign, asked: Asked | None = None, *, progress: Progress
     """
     design = as_design(design)
     asked = Asked.of(design) if asked is None else asked
-    instance_of("asked", asked, Asked)
     kept = tuple(one for one in design.requirements if one.quantity not in ANALYSIS_QUANTITIES)
     made = []
     for name, words, there in _made(design, asked):
@@ -115,7 +114,10 @@ def worst_of(corners: Iterable[Corner], name: str) -> float:
 
     -inf (or inf) where a loop is not stable.
     """
-    quantity = QUANTITIES[QUANTITIES[name].cornered]
+    known = {one.name: QUANTITIES[figure] for figure, one in CORNERED.items()}
+    if name not in known:
+        raise InputError(f"quantity {name!r}: one of {', '.join(known)}")
+    quantity = known[name]
     loops = [one.judged for corner in corners for one in corner.figures.values()]
     if not all(one.stable for one in loops):
         return -quantity.better * inf
@@ -182,7 +184,7 @@ def worst_ends(design: Design, quantity: str) -> dict[str, float]:
     ends = [end for each in drawn(design) for end in _ends(design, *each)]
     base = {path: float(design.parameters[path].value) for end in ends for path in end}
     try:
-        figures = population_figures(moved(design, base, ends), design)
+        figures = population_loop_figures(moved(design, base, ends), design)
     except InputError:
         return {}
     better = QUANTITIES[quantity].better

@@ -7,6 +7,7 @@ from math import inf, isfinite, pi
 from typing import TYPE_CHECKING, Annotated
 
 from actuator_lti.errors import InputError
+from actuator_lti.start.border import asked
 from analyses.request import Option, given, key_of
 
 if TYPE_CHECKING:
@@ -17,6 +18,7 @@ SIZES = {"position": "amplitude_rad", "velocity": "speed_rad_s", "current": "cur
 """The field that holds the peak of a duty, by the loop that takes the command."""
 
 
+@asked
 @dataclass(frozen=True, kw_only=True)
 class Asked:
     """Hold a duty cycle against continuous current, overload protection (I2t) and winding temperature.

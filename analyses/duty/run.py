@@ -12,7 +12,7 @@ from actuator_lti.design.loader import AnyDesign, as_design
 from actuator_lti.design.model import Design
 from actuator_lti.drive.operating import follows_angle, runs
 from actuator_lti.drive.steady import winding
-from actuator_lti.errors import InputError, instance_of
+from actuator_lti.errors import InputError
 from actuator_lti.types import Floats
 from analyses.duty.asked import Asked
 from analyses.failures.cases import jammed
@@ -138,7 +138,6 @@ def duty(design: AnyDesign, asked: Asked | None = None) -> Duty:
     if not design.controller.stages:
         raise InputError("duty: needs a drive with a loop")
     asked = Asked.of(design) if asked is None else asked
-    instance_of("asked", asked, Asked)
     there = jammed(design) if design.controller.outermost == "current" else design
     free = replace(there, limits=replace(design.limits, peak_time_s=None))
     run, ticks = _moving(free, asked)

@@ -7,6 +7,7 @@ from math import inf, isfinite
 from typing import TYPE_CHECKING, Annotated
 
 from actuator_lti.errors import InputError
+from actuator_lti.start.border import asked
 from analyses.request import Option, given
 
 if TYPE_CHECKING:
@@ -15,6 +16,7 @@ if TYPE_CHECKING:
 NEAR_SHARE = 0.1  # of the full deflection: the deflection asked for where none is stated
 
 
+@asked
 @dataclass(frozen=True, kw_only=True)
 class Asked:
     """Simulate jam, hard-over, open phase, frozen and lost sensor and an oscillatory command.

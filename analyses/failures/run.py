@@ -10,7 +10,7 @@ from actuator_lti.asked.verdict import Verdict
 from actuator_lti.design.loader import AnyDesign, as_design
 from actuator_lti.design.model import Design
 from actuator_lti.drive.operating import follows_angle, runs, straight
-from actuator_lti.errors import InputError, UnstableError, instance_of
+from actuator_lti.errors import InputError, UnstableError
 from actuator_lti.loops import assemble_loops
 from actuator_lti.loops.stiffness import compliance
 from actuator_lti.types import Floats
@@ -109,7 +109,6 @@ def failures(design: AnyDesign, asked: Asked | None = None) -> Failures:
     """
     design = as_design(design)
     asked = Asked.of(design) if asked is None else asked
-    instance_of("asked", asked, Asked)
     if asked.watched_s / design.controller.period_s > MOST_TICKS:
         longest = MOST_TICKS * design.controller.period_s
         raise InputError(f"watched {asked.watched_s:g} s: at most {longest:g} s with this period")

@@ -29,15 +29,14 @@ class Bend:
     errors: float  # standard errors that the term is from zero
     moved: Floats = field(repr=False)  # what each value of the fit changes by beside it
     blocks: int  # behind the standard error
+    share: float = 0.0  # of the drive, that is this term
     own: Floats = field(repr=False)  # of the term: what the values of the fit leave of it, of size 1 (or 0)
-    chance: float = (
-        1.0  # probability of a term as sure as this among all that were tried, the law being right
-    )
+    chance: float = 1.0  # of a term as sure as this among all that were tried, the law being right
 
     @property
     def is_sure(self) -> bool:
-        """Whether no chance explains it."""
-        return self.chance < NO_CHANCE
+        """Whether no chance explains it, and it is more than simulated records err by."""
+        return self.chance < NO_CHANCE and self.share > RESOLVED
 
 
 def bend_of(model: JointModel) -> Bend:
@@ -63,12 +62,13 @@ def bend_of(model: JointModel) -> Bend:
 
 def _term(model: JointModel, speed: float) -> Bend:
     """One term; no standard errors from zero where the rows do not tell it."""
-    tables, rests, fitted = [], [], []
+    tables, rests, fitted, drive = [], [], [], 0.0
     for weight, part in zip(model.weights, model.records, strict=True):
         rows = part.compared if model.simulated else away_from_reversals(part)
         term, used = part.answered(_bent(part.speed, speed)), part.compared
         tables.append(weight * np.column_stack([part.w, *kept_columns(model, part), term])[rows])
         rests.append(weight * part.noise[rows[used]])
+        drive = float(np.hypot(drive, weight * np.linalg.norm(part.y[rows])))
         fitted.append(weight * np.column_stack([part.w, term])[used])
     term, rest = np.concatenate(tables)[:, -1], np.concatenate(rests)
     # where the motion turns back is most of what a bend makes of the values
@@ -86,8 +86,8 @@ def _term(model: JointModel, speed: float) -> Bend:
     error = float(np.sqrt(wider_covariance(left)[-1, -1]))
     errors = abs(float(found[-1])) / error if error > 0.0 else 0.0
     blocks = sum(event_blocks(len(one)) for one in rests)
-    moved = found[-1] * moved
-    return Bend(speed_rad_s=speed, errors=errors, moved=moved, blocks=blocks, own=own / size)
+    moved, share = found[-1] * moved, abs(float(found[-1])) * size / drive
+    return Bend(speed_rad_s=speed, errors=errors, moved=moved, blocks=blocks, own=own / size, share=share)
 
 
 def kept_columns(model: JointModel, part: RecordFit) -> Iterator[Floats]:

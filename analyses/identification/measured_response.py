@@ -23,7 +23,7 @@ from analyses.identification.response_model import Seen, loop_model
 from analyses.identification.response_search import STEP
 from analyses.identification.to_design import design_with_fit, with_correlations
 from analyses.identification.verdict import Identified, Item, kept_items, simulated_item
-from analyses.records.consistency import SURE
+from analyses.records.consistency import NO_CHANCE, SURE
 from analyses.studies.sampling import correlation_of
 
 KEYS = (
@@ -35,7 +35,6 @@ KEYS = (
     "control.computing_delay",
 )
 CONSTANT_KEYS = {parameter(name).key for name in CONSTANTS}
-LEVEL = 1e-3  # probability with which noise of the stated size alone fails a response
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -105,7 +104,7 @@ def identify_response(
         level = float(chi2.sf(float(fit.rest @ fit.rest), len(fit.rest) - len(fit.names)))
         label = f"The measured deviations explain what is left (misfit {fit.misfit:.3g})"
         why = f"by chance with a probability of {level:.1g}: another drive, or at another operating point"
-        items.insert(0, Item.of("misfit", label, "" if level > LEVEL else why))
+        items.insert(0, Item.of("misfit", label, "" if level > NO_CHANCE else why))
     ended = "it ended at the least or largest value of its key: the response wants another"
     items += [Item.of(f"bound-{key}", f"{key} is within what its key allows", ended) for key in fit.at_bound]
     if fit.also:

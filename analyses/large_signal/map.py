@@ -12,7 +12,7 @@ import numpy as np
 from actuator_lti.design.loader import AnyDesign, as_design
 from actuator_lti.design.model import Design
 from actuator_lti.drawing import draw
-from actuator_lti.errors import instance_of, whole_numbers
+from actuator_lti.errors import finite_number, whole_number
 from actuator_lti.loops import Loops
 from actuator_lti.loops.limiters import onset
 from actuator_lti.start.extras import need
@@ -111,8 +111,8 @@ def amplitude_map(
     `MOST_TICKS`.
     """
     design = as_design(design)
-    instance_of("loops", loops, Loops)
-    given = whole_numbers("counts", counts, 2, 2)
+    finite_number("load_Nm", load_Nm)
+    given = [whole_number("counts", each, 2) for each in counts]
     part = min(np.sqrt(MOST_TICKS / (given[0] * work_ticks(design, loops, given[1]))), 1.0)
     counts = max(int(part * given[0]), 2), max(int(part * given[1]), 2)
     frequencies = tones(design, loops, counts[1])

@@ -7,6 +7,7 @@ import numpy as np
 
 from actuator_lti.design.loader import AnyDesign, as_design
 from actuator_lti.design.model import Design
+from actuator_lti.errors import positive_number
 from analyses.large_signal.classify import FULL_TRIANGLE, RateLimited, rate_limited
 from analyses.large_signal.tones import Tone, tone
 from analyses.specification.capability import drive_figures
@@ -93,6 +94,9 @@ def sawtooth(
     (x >= 1.862).
     """
     design = as_design(design)
+    for name, value in (("amplitude_rad", amplitude_rad), ("frequency_hz", frequency_hz)):
+        if value is not None:
+            positive_number(name, value)
     amplitude = design.validation.full_deflection_rad if amplitude_rad is None else amplitude_rad
     limit = design.limits.speed_rad_s
     if design.controller.velocity is None or not math.isfinite(limit):

@@ -45,7 +45,8 @@ SPEEDS, DECADES = 36, 6.0  # of the motor, that friction is looked at with
 RESOLVED = 1e-9  # of the radius
 _TURNS = 1e-6  # least angle of an eigenvalue that oscillates
 _GONE = 0.01  # in one period: no oscillation; eigenvalues of what is late are zero, and rounding turns them
-_STEPS = 60  # of the fixed point between the amplitudes of both speeds
+_STEPS, _SETTLED = 60, 1e-7  # of the fixed point between the amplitudes of both speeds
+_JUMP = 10.0 * _SETTLED  # a radius comes as near to 1; it jumps past where another mode is the least damped
 
 
 @dataclass(frozen=True)
@@ -143,7 +144,9 @@ def kept_up(
             if _changes(excess(low), excess(value)):
                 root = float(brentq(excess, low, value, xtol=1e-12))
                 there = mode(root, last)
-                if there is not None and there.frequency_hz > 0.0:
+                if (
+                    there is not None and abs(there.radius - 1.0) < _JUMP
+                ):  # else others become the least damped
                     yield root, there, last.radius > 1.0
         last = now
 
@@ -157,7 +160,7 @@ def _at_twist(design: Design, A: float, friction: bool, near: Mode | None) -> Mo
     """The least damped oscillation at a twist of amplitude A, the speeds in it being its own.
 
     With friction a fixed point, begun with the shape of an oscillation ``near``, or where that leads to none
-    with speeds at which friction is small.
+    with speeds at which friction is small. None where it does not settle: friction stops what it began with.
     """
     speeds = _speeds(near, A)
     for _ in range(_STEPS):
@@ -167,10 +170,10 @@ def _at_twist(design: Design, A: float, friction: bool, near: Mode | None) -> Mo
         if mode is None or not friction:
             return mode
         now = _speeds(mode, A)
-        if max(abs(log(new / old)) for new, old in zip(now, speeds, strict=True)) < 1e-7:
-            break
+        if max(abs(log(new / old)) for new, old in zip(now, speeds, strict=True)) < _SETTLED:
+            return mode
         speeds = now[0] ** 0.6 * speeds[0] ** 0.4, now[1] ** 0.6 * speeds[1] ** 0.4
-    return mode
+    return None
 
 
 def _speeds(mode: Mode | None, A: float) -> tuple[float, float]:

@@ -4,9 +4,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
+from actuator_lti.start.border import asked
 from analyses.request import LOAD, POINT, Option
 
 
+@asked
 @dataclass(frozen=True, kw_only=True)
 class Asked:
     """Print margins, bandwidths and verdicts of every loop; the margins are certified.

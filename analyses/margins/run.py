@@ -9,7 +9,7 @@ import numpy as np
 from actuator_lti.asked.verdict import Tally, Verdict
 from actuator_lti.design.loader import AnyDesign, as_design
 from actuator_lti.design.model import Design
-from actuator_lti.errors import InputError, instance_of
+from actuator_lti.errors import InputError
 from actuator_lti.files.response import Loop as Kind
 from actuator_lti.files.response import RecordedResponse, read_response
 from actuator_lti.loops import Loops, assemble_loops
@@ -206,7 +206,6 @@ def margins(design: AnyDesign, asked: Asked | None = None) -> Margins:
     """
     design = as_design(design)
     asked = asked or Asked()
-    instance_of("asked", asked, Asked)
     loops = assemble_loops(
         design,
         form=asked.form,  # type: ignore[arg-type]

@@ -21,6 +21,7 @@ from actuator_lti.drive.operating import OperatingPoint
 from actuator_lti.errors import InputError
 from actuator_lti.files.atomic import write_bytes
 from actuator_lti.loops import assemble_loops
+from actuator_lti.start.border import asked
 from actuator_lti.start.extras import need
 from actuator_lti.types import Progress
 from analyses.finite import finite
@@ -40,6 +41,7 @@ NOTED_S = 30.0
 SIZE = itemgetter(1)  # of a chunk: how many samples it has
 
 
+@asked
 @dataclass(frozen=True)
 class MonteCarloSettings:
     """What a study is to do."""

@@ -23,9 +23,10 @@ from actuator_lti.design import design_hash, with_values
 from actuator_lti.design.model import Design, Requirement
 from actuator_lti.design.tolerances import together
 from actuator_lti.drive.operating import OperatingPoint
-from actuator_lti.errors import InputError
+from actuator_lti.errors import InputError, finite_number
 from actuator_lti.files.atomic import write_bytes
 from actuator_lti.files.reading import Tree
+from actuator_lti.start.border import asked
 from analyses.monte_carlo.judging import drive_column, in_populations, loop_column, loop_columns, loops_of
 from analyses.studies.engine import Arrays, Chunk
 from analyses.studies.proof import code_version
@@ -117,6 +118,7 @@ def _whole(path: Path, count: int) -> bool:
         return False
 
 
+@asked
 @dataclass(frozen=True)
 class StepCheck:
     """A step command from rest, of what the outermost loop follows."""
@@ -128,6 +130,7 @@ class StepCheck:
     def __post_init__(self) -> None:
         if not (0 < self.amplitude_rad < np.inf and 0 < self.duration_s <= 100.0):
             raise InputError("nonlinear step: an amplitude above 0 and a duration above 0, at most 100 s")
+        finite_number("load_Nm", self.load_Nm)
 
 
 STEP: Mapping[str, tuple[str, Callable[[BatchResult], np.ndarray]]] = {
@@ -168,6 +171,7 @@ def step_columns(step: StepCheck, population: Population) -> Arrays:
     return {f"nonlinear.{name}": np.where(run.ok, read(run), np.nan) for name, (_, read) in STEP.items()}
 
 
+@asked
 @dataclass(frozen=True)
 class SampleTask:
     """Figures of numbered samples of a design; goes to workers as it is."""

@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Annotated
 
 from actuator_lti.errors import InputError
+from actuator_lti.start.border import asked
 from analyses.request import LOAD, Option
 
 KINDS = "step, ramp, sine, stepped-sine, chirp, triangle, multisine, hold, recorded"
@@ -20,6 +21,7 @@ OF = {  # the commands that an option is for
 USUAL_CYCLES = 5
 
 
+@asked
 @dataclass(frozen=True, kw_only=True)
 class Asked:
     """Move the drive in the nonlinear simulator: every limit, stick and slip, exact between the ticks.

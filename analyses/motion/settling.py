@@ -256,7 +256,8 @@ class Conduct:
 def conduct(run: Trajectory, full_deflection_rad: float = 0.0) -> Conduct:
     """Judge a run; where its end comes too early, the drive is followed beyond it.
 
-    Swings that are too small beside full deflection (m on a linear axis) are rest.
+    Swings that are too small beside full deflection (m on a linear axis) are rest; they are told where the
+    run is as long as their period.
 
     >>> from nonlinear import commands, simulate
     >>> conduct(simulate("ilr33-amber", commands.step(0.01), duration_s=0.2)).status
@@ -270,16 +271,16 @@ def conduct(run: Trajectory, full_deflection_rad: float = 0.0) -> Conduct:
     unit, factor = COMMAND_UNITS[run.axis, "velocity" if run.stage == "voltage" else run.stage]
     if run.stage == "position":
         rest = counted(rest, full_deflection_rad)
+    shorter = run.time_s[-1] * (rest.frequency_hz or inf) < 1.0  # the run than a period
     if not rest.comes_to_rest:
         text = words(rest, factor, unit).removeprefix("limit cycle of ").removeprefix("still moving ")
-        shorter = run.time_s[-1] * (rest.frequency_hz or inf) < 1.0  # the run than a period
         unseen = shorter or rest.verdict == "diverging"
         beyond = f"followed for {rest.after_s:.3g} s beyond the run" if unseen else ""
         return Conduct(rest.verdict, text, beyond)
     limits = [f"{n} limit of {run.limits[n].limit:.4g} {run.limits[n].unit}" for n in rest.limited]
     if limits:
         return Conduct("sits on a limit", ", ".join(limits))
-    faint = faint_words(rest, factor, unit) if rest.amplitude else ""
+    faint = faint_words(rest, factor, unit) if rest.amplitude and not shorter else ""
     left = abs(float(run.reference_rad[-1] - run.followed[-1]) - rest.error)
     far = left > NEAR * np.abs([*run.followed, run.reference_rad[-1]]).max()
     later = f"after the run, which ends {factor * left:.3g} {unit} short of that" if far else ""

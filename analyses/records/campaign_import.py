@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from actuator_lti.errors import InputError, shown
+from actuator_lti.errors import InputError
 from actuator_lti.types import Progress
 from analyses.records.campaign_file import Campaign, RunEntry
 from analyses.records.clocks import ClockJoin, Mismatch, clock_join, joined_by
@@ -100,8 +100,6 @@ def import_campaign(campaign: Campaign, *, progress: Progress = None) -> Importe
 
     Raises `InputError`: if no run at all can be used.
     """
-    if not isinstance(campaign, Campaign):
-        raise InputError(f"campaign = {shown(campaign)}: allowed: a Campaign, as load_campaign gives")
     runs, aside = [], []
     for k, entry in enumerate(campaign.runs, 1):
         try:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from scipy.signal import butter, cheby1, filtfilt, sosfiltfilt
@@ -11,6 +12,8 @@ from actuator_lti.errors import InputError
 from actuator_lti.types import Floats
 
 LARGEST_DIRECT = 10
+# a search filters the same rows a thousand times, and designing the filter takes as long as running it
+_butterworth, _chebyshev = (lru_cache(maxsize=64)(design) for design in (butter, cheby1))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -81,7 +84,7 @@ def low_pass(values: Floats, period_s: float, *, cutoff_hz: float, order: int) -
         raise InputError(
             f"cutoff = {cutoff_hz:g} Hz: {told}; allowed: {lowest_hz:.6g} Hz and more, or more rows"
         )
-    b, a = butter(order, 2.0 * cutoff_hz * period_s)
+    b, a = _butterworth(order, 2.0 * cutoff_hz * period_s)
     return np.asarray(filtfilt(b, a, values, padlen=padding), dtype=np.float64)
 
 
@@ -96,10 +99,10 @@ def decimated(columns: Floats, factor: int) -> Floats:
     if len(columns) <= 24:
         raise InputError(f"{len(columns)} samples are too few to decimate by {factor}")
     if factor <= LARGEST_DIRECT:
-        b, a = cheby1(8, 0.05, 0.8 / factor)
+        b, a = _chebyshev(8, 0.05, 0.8 / factor)
         smooth = np.asarray(filtfilt(b, a, columns, axis=0, padlen=24), dtype=np.float64)
     else:  # as one polynomial its coefficients would cancel
-        sections = cheby1(8, 0.05, 0.8 / factor, output="sos")
+        sections = _chebyshev(8, 0.05, 0.8 / factor, output="sos")
         padding = min(3 * factor, len(columns) - 1)
         smooth = np.asarray(sosfiltfilt(sections, columns, axis=0, padlen=padding), dtype=np.float64)
     kept = -(-len(columns) // factor)

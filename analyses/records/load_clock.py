@@ -27,8 +27,8 @@ def by_current(drive: Record, sensor: Record, join: ClockJoin, signal: str) -> C
     Speed and load tell the clock only where the load comes with the motion. While the speed is steady the
     current is a share of the load, which is against the motion, and a slow drift: of all offsets at which the
     sensor covers half of that time, the one that leaves the least is taken where the likelihood ratio
-    (chi-square, as many tries as offsets, the residual's correlation in time counted) rejects all within four
-    standard deviations of the join's own, whose rate does not hold then either. The standard deviation is the
+    (chi-square, as many tries as offsets, the residual's correlation in time counted) rejects all that the
+    join's own standard deviation allows, whose rate does not hold then either. The standard deviation is the
     half width where that ratio is 1.
     """
     try:

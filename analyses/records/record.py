@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from actuator_lti.design.model import Design
-from actuator_lti.errors import InputError, shown
+from actuator_lti.errors import InputError
 from actuator_lti.types import Floats, Mask
 
 DISORDER = "whose time does not increase"
@@ -189,8 +189,6 @@ def named_apart(records: Sequence[Record], taken: Sequence[str] = ()) -> list[Re
 
 def prepared(record: Record) -> Record:
     """A record on a regular grid, cut to its longest stretch with the drive enabled, both noted."""
-    if not isinstance(record, Record):
-        raise InputError(f"record = {shown(record)}: allowed: a Record, as open_record gives")
     record = record if record.is_regular else record.resampled()
     if "enable" not in record.signals:
         return record

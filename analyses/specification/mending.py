@@ -3,11 +3,12 @@
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from math import inf, log
+from typing import Any
 
 import numpy as np
 
 from actuator_lti.asked.quantities import CUSTOMARY, LOOP_QUANTITIES, reserve
-from actuator_lti.batch import Population, linear_figures
+from actuator_lti.batch import LinearFigures, Population, linear_figures
 from actuator_lti.design import parameter_value
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
@@ -74,9 +75,21 @@ def _moves(weak: Sequence[View], design: Design) -> Iterator[Move]:
 
 
 def _first(weak: Sequence[View], design: Design, path: str, values: np.ndarray) -> int | None:
-    least = np.min([_reserves(view, design, path, values) for view in weak], axis=0)
-    inside = np.flatnonzero(least >= 0.0)
-    return int(inside[0]) if inside.size else None
+    """Which value is the first within the limits of all views; a point is asked what those before leave."""
+    left = np.arange(len(values))
+    for same in _by_point(weak):
+        left = left[_reserves(same, design, path, values[left]).min(axis=0) >= 0.0]
+        if not left.size:
+            return None
+    return int(left[0])
+
+
+def _by_point(views: Iterable[View]) -> list[list[View]]:
+    """Views of one design at one operating point, together: their loops are figures of one population."""
+    points: dict[Any, list[View]] = {}
+    for view in views:
+        points.setdefault((id(view.design), view.kind, view.load_Nm), []).append(view)
+    return list(points.values())
 
 
 def _written(value: float, was: float) -> float:
@@ -85,14 +98,18 @@ def _written(value: float, was: float) -> float:
     return float(f"{unit * (np.ceil if value > was else np.floor)(value / unit * (1.0 - 1e-12)):.3g}")
 
 
-def _reserves(view: View, design: Design, path: str, values: np.ndarray) -> np.ndarray:
-    """The least reserve of a view for each value of a gain; minus infinity where the loop is not stable."""
+def _reserves(same: Sequence[View], design: Design, path: str, values: np.ndarray) -> np.ndarray:
+    """The least reserve of views of one point, (views, values of a gain); minus infinity where not stable."""
+    at = {"operating_point": same[0].kind, "load_Nm": same[0].load_Nm}
     try:
-        population = Population(view.design or design, {path: values}, len(values))
-        at = {"operating_point": view.kind, "load_Nm": view.load_Nm}
+        population = Population(same[0].design or design, {path: values}, len(values))
         found = linear_figures(population, **at, time_figures=False, held=True)
     except InputError:
-        return np.full(len(values), -inf)
+        return np.full((len(same), len(values)), -inf)
+    return np.array([_least(found, view, design) for view in same])
+
+
+def _least(found: LinearFigures, view: View, design: Design) -> np.ndarray:
     limits = {name: limit_of(design, name, view)[0] for name in CUSTOMARY}
     rows = zip(*(np.abs(found.quantity(name, view.loop)) for name in CUSTOMARY), strict=True)
     least = [
@@ -105,9 +122,9 @@ def _reserves(view: View, design: Design, path: str, values: np.ndarray) -> np.n
 def _harmless(move: Move, others: Iterable[View], design: Design) -> bool:
     """Whether no view goes further beyond its limits, and no requirement that is met is lost."""
     both = np.array([move.was, move.value])
-    for view in others:
-        before, after = _reserves(view, design, move.path, both)
-        if after < min(before, 0.0):
+    for same in _by_point(others):
+        before, after = _reserves(same, design, move.path, both).T
+        if np.any(after < np.minimum(before, 0.0)):
             return False
     found = linear_figures(Population(design, {move.path: both}, 2), time_figures=True, held=True)
     columns = loop_columns(found, design)

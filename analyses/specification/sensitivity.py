@@ -100,6 +100,17 @@ def population_figures(
     Margins of an unstable loop are negative: how far it is from stable. Behind the mean of a limited jerk the
     response to the command is not among them.
     """
+    columns = population_loop_figures(population, design, time_figures=time_figures)
+    for name, load in drive_cases(design.validation.loads_Nm):
+        if name != "motor_current" or design.motor.has_electrical_dynamics:
+            columns[f"drive.{name}@{load:g}"] = drive_figures(population, name, load)
+    return columns
+
+
+def population_loop_figures(
+    population: Population, design: Design, *, time_figures: bool = False
+) -> dict[str, np.ndarray]:
+    """Those of `population_figures` that are of the loops alone."""
     linear = linear_figures(population, time_figures=time_figures, held=True)
     columns = {}
     for loop in linear.loops:
@@ -109,7 +120,4 @@ def population_figures(
                 values = linear.quantity(name, loop)
                 sized = np.abs(values) if quantity.absolute else values
                 columns[f"{loop}.{name}"] = np.where(linear.stable(loop), sized, -sized)
-    for name, load in drive_cases(design.validation.loads_Nm):
-        if name != "motor_current" or design.motor.has_electrical_dynamics:
-            columns[f"drive.{name}@{load:g}"] = drive_figures(population, name, load)
     return columns

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
+from actuator_lti.start.border import asked
 from analyses.request import Option
 
 if TYPE_CHECKING:
@@ -13,6 +14,7 @@ if TYPE_CHECKING:
 Aim = Literal["least-change", "reserve"]
 
 
+@asked
 @dataclass(frozen=True)
 class TuningSettings:
     """What tuning is to do; the words of `Asked`, read."""

@@ -11,7 +11,6 @@ from actuator_lti.design import parameter_value, paths_of, with_values
 from actuator_lti.design.fields import FIELDS, Structure, template_of
 from actuator_lti.design.loader import AnyDesign, as_design
 from actuator_lti.design.model import Design, Requirement
-from actuator_lti.errors import InputError, shown
 from actuator_lti.types import Floats, Progress
 from analyses.monte_carlo.judging import label
 from analyses.specification.requirements import RequirementVerdict
@@ -42,8 +41,6 @@ def tune(
     Raises `InputError`: if there is no requirement on a loop, or an element has no place in the drive.
     """
     design, settings = as_design(design), settings or TuningSettings()
-    if not isinstance(settings, TuningSettings):
-        raise InputError(f"settings = {shown(settings)}: allowed: TuningSettings")
     wanted = gain_requirements(design, settings.requirements)
     allowed = checked(design, settings.place)
     choices = [each for count in range(len(allowed) + 1) for each in combinations(allowed, count)]

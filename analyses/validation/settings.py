@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, Literal, get_args
 
+from actuator_lti.start.border import asked
 from analyses.request import Option
 
 if TYPE_CHECKING:
@@ -17,6 +18,7 @@ Finding = Literal[
 FINDINGS: tuple[Finding, ...] = get_args(Finding)
 
 
+@asked
 @dataclass(frozen=True, kw_only=True)
 class Settings:
     """What a validation looks at beside its checks; the defaults are those of the report."""
@@ -31,6 +33,7 @@ QUICK = Settings(findings=())  # all that the verdict is made of, without findin
 CHECKS = Settings(own=False, findings=())  # the checks alone
 
 
+@asked
 @dataclass(frozen=True, kw_only=True)
 class Asked:
     """Check every prediction against the derivative of the nonlinear simulator, and show where it ends.

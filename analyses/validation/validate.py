@@ -11,7 +11,7 @@ from actuator_lti.asked.verdict import Verdict
 from actuator_lti.design.loader import AnyDesign, as_design
 from actuator_lti.design.model import Design
 from actuator_lti.drive.profile import command_mean
-from actuator_lti.errors import InputError, NumericalError, TooManyTicks, instance_of
+from actuator_lti.errors import InputError, NumericalError, TooManyTicks
 from actuator_lti.loops import assemble_loops
 from actuator_lti.loops.assemble import loops_at
 from actuator_lti.types import Progress
@@ -64,7 +64,6 @@ def validate(
     (True, 0)
     """
     design, settings = as_design(design), settings or Settings()
-    instance_of("settings", settings, Settings)
     return _Work(design, settings, Bench(design, model or design), progress).run()
 
 

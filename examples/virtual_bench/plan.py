@@ -7,8 +7,8 @@ from math import isfinite, pi
 
 import numpy as np
 
+from actuator_lti.design import no_load_speed
 from actuator_lti.design.model import Design
-from actuator_lti.design.plant import no_load_speed
 from actuator_lti.drive.facts import resonance_rad_s, steady_torque_Nm
 from actuator_lti.drive.operating import Operating, stiffness_there
 from actuator_lti.drive.steady import circuit_resistance_ohm, motor_torque_Nm

@@ -7,6 +7,7 @@ from typing import Literal
 import numpy as np
 
 from actuator_lti.errors import InputError, finite_number
+from actuator_lti.start.border import asked
 from actuator_lti.types import Floats
 from nonlinear._kernels import layout as at
 from nonlinear.commands import Command
@@ -14,6 +15,7 @@ from nonlinear.commands import Command
 Point = Literal["u", "i_ref", "w_ref", "output"]
 
 
+@asked
 @dataclass(frozen=True, kw_only=True)
 class Probe:
     """Break point of a loop: ``after = gain * delayed(before) + injection``, held to the stage's limit.
@@ -37,12 +39,10 @@ class Probe:
     delay_samples: float = 0.0
 
     def __post_init__(self) -> None:
-        if self.point not in at.POINTS:
-            raise InputError(f"probe point = {self.point!r}: must be one of {', '.join(at.POINTS)}")
         finite_number("probe gain", self.gain, "finite, a plain factor")
         if finite_number("probe delay_samples", self.delay_samples, "zero or more, finite") < 0.0:
             raise InputError(f"probe delay_samples = {self.delay_samples}: must be zero or more")
-        if isinstance(self.injection, np.ndarray) and not np.isfinite(self.injection).all():
+        if not (isinstance(self.injection, Command | None) or np.isfinite(self.injection).all()):
             raise InputError(f"probe at {self.point}: injection holds values that are not finite")
 
 

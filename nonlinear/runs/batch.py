@@ -47,8 +47,8 @@ def simulate_many(
     >>> bool((result.step.rise_time_s < 0.1).all())
     True
     """
-    if not isinstance(runs, Sequence) or not runs or not isinstance(runs[0], Run):
-        raise InputError(f"runs = {shown(runs)}: allowed: a sequence of Run, at least one")
+    if not runs:
+        raise InputError(f"runs = {shown(runs)}: must be several, at least one")
     tables = Tables()
     rows = np.array([run.row(tables) for run in runs])
     return run_rows(rows, tables.joined(), threads=threads, progress=progress)

@@ -23,7 +23,7 @@ def read_columns(
     TABLE_ROWS.check(text.count("\n"), where)
     try:
         rows = [row for row in csv.reader(text.splitlines(), delimiter=delimiter) if row]
-    except csv.Error as error:
+    except (csv.Error, TypeError) as error:  # or a delimiter of several characters
         raise InputError(f"no table: {error}", where) from error
     if len(rows) < 2:
         raise InputError("a header line and at least one row of numbers needed", where)

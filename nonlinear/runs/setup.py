@@ -10,7 +10,8 @@ import numpy.typing as npt
 
 from actuator_lti.bounds import RUN_TICKS
 from actuator_lti.design.model import Design
-from actuator_lti.errors import InputError, finite_number, shown
+from actuator_lti.errors import InputError, finite_number, positive_number, shown
+from actuator_lti.start.border import asked
 from actuator_lti.types import Compared, Floats
 from nonlinear._kernels import layout as at
 from nonlinear.bench.probe import Probe, write_probe
@@ -51,6 +52,7 @@ class Tables(Compared):
         return np.concatenate(self.parts) if self.parts else np.zeros(1)
 
 
+@asked
 @dataclass(frozen=True, kw_only=True)
 class Reducers:
     """What to keep of a run beside final state, limit use and events.
@@ -80,10 +82,11 @@ class Reducers:
         row[..., at.WINDOW], row[..., at.CYCLES] = self.window_ticks, self.cycles
         row[..., at.HARMONICS], row[..., at.WITH_EXTREMES] = self.harmonics, self.extremes
         row[..., at.STEP_TARGET] = self.step_target_rad
-        if self.step_target_rad:
-            row[..., at.STEP_BAND] = self.step_band
+        if finite_number("step_target_rad", self.step_target_rad):
+            row[..., at.STEP_BAND] = positive_number("step_band", self.step_band)
 
 
+@asked
 @dataclass(frozen=True, kw_only=True)
 class Run:
     """One run of a batch; the names are those of `nonlinear.simulate`."""
@@ -123,9 +126,6 @@ _kept_row = lru_cache(maxsize=16)(design_row)  # a design is mostly run more tha
 
 def _design_row(design: Design, friction_on: bool, limits_on: bool) -> Floats:
     """The row of a design alone."""
-    for name, switch in (("friction_on", friction_on), ("limits_on", limits_on)):
-        if switch not in (True, False):
-            raise InputError(f"{name} = {shown(switch)}: allowed: True or False")
     try:
         return _kept_row(design, friction_on=friction_on, limits_on=limits_on)
     except TypeError:  # a list in place of a tuple
@@ -149,17 +149,8 @@ def _put_signal(row: Floats, place: int, command: Command, tables: Tables) -> No
     write(command, row, place, offset, length)
 
 
-def check_command(given: object, name: str = "command") -> None:
-    """Refuse what is no command."""
-    if not isinstance(given, Command):
-        raise InputError(
-            f"{name} = {shown(given)}: allowed: a Command, from a function of nonlinear.commands"
-        )
-
-
 def check_frequency(design: Design, command: Command) -> None:
-    """Refuse what is no command, and one that the outermost loop, sampled, cannot follow in principle."""
-    check_command(command)
+    """Refuse a command that the outermost loop, sampled, cannot follow in principle."""
     control = design.controller
     nyquist = 0.5 / control.period_of(control.outermost)
     sampled = control.outermost in ("position", "velocity")
@@ -195,7 +186,6 @@ def put_torque(row: Floats, torque_Nm: npt.ArrayLike, tables: Tables) -> None:
 
 def put_supply(row: Floats, design: Design, supply: Command, scales: bool, tables: Tables) -> None:
     """Write a bus voltage over time; see `nonlinear.simulate`."""
-    check_command(supply, "supply")
     nominal = design.limits.voltage_V
     if scales and (design.controller.current is not None or not isfinite(nominal)):
         message = "supply_scales: needs a drive without a current loop, and a finite limits.voltage"
@@ -209,8 +199,6 @@ def put_supply(row: Floats, design: Design, supply: Command, scales: bool, table
 
 def _put_probes(row: Floats, probes: Sequence[Probe], tables: Tables) -> None:
     """Write the probes, at most one a point."""
-    if not isinstance(probes, Sequence) or not all(isinstance(probe, Probe) for probe in probes):
-        raise InputError(f"probes = {shown(probes)}: allowed: a sequence of Probe")
     seen = set()
     for probe in probes:
         if probe.point in seen:
@@ -229,8 +217,6 @@ def _put_probes(row: Floats, probes: Sequence[Probe], tables: Tables) -> None:
 
 def put_state(row: Floats, state: State) -> None:
     """Write the initial state."""
-    if not isinstance(state, State):
-        raise InputError(f"initial = {shown(state)}: allowed: a State, such as State(motor_angle_rad=0.1)")
     for name, value in vars(state).items():
         if name != "law" and value is not None:
             finite_number(f"initial.{name}", value)

@@ -13,7 +13,7 @@ import numpy.typing as npt
 from actuator_lti.design.loader import AnyDesign, as_design
 from actuator_lti.design.model import Axis, Design
 from actuator_lti.drive.signals import LIMITERS
-from actuator_lti.errors import InputError, NumericalError, finite_number, shown, whole_number
+from actuator_lti.errors import InputError, NumericalError, finite_number, whole_number
 from actuator_lti.types import Floats, Progress
 from nonlinear._kernels import layout as at
 from nonlinear.bench.probe import Probe
@@ -22,7 +22,7 @@ from nonlinear.loads import LoadMoment
 from nonlinear.native import parameters, resume
 from nonlinear.row.parameters import MAX_EVENTS_PER_TICK, TANH_TOLERANCE
 from nonlinear.runs.running import Running
-from nonlinear.runs.setup import STATE_PLACES, Run, Tables, check_command, put_supply, put_torque
+from nonlinear.runs.setup import STATE_PLACES, Run, Tables, put_supply, put_torque
 from nonlinear.runs.trajectory import STATUS, Energy, LimitUse, ProbeRecord, State, Status, Trajectory
 
 LOOK_S = 0.1  # between two looks at a run
@@ -97,7 +97,6 @@ def simulate(
     >>> run.time_s.size, bool(abs(run.output_angle_rad[-1] - 0.01) < 1e-3)
     (1000, True)
     """
-    check_command(command)
     design, tables = as_design(design), Tables()
     row = Run(
         design=design, command=command, duration_s=duration_s, load_Nm=load_Nm, bias=bias, probes=probes,
@@ -107,8 +106,6 @@ def simulate(
     row[at.TANH_TOLERANCE] = finite_number("tanh_tolerance", tanh_tolerance)
     if not tanh_tolerance > 0.0:
         raise InputError(f"tanh_tolerance = {tanh_tolerance}: allowed: above 0")
-    if not (progress is None or callable(progress)):
-        raise InputError(f"progress = {shown(progress)}: allowed: a function of (done, total), or None")
     row[at.MAX_EVENTS] = min(whole_number("max_events", max_events), 2**53)
     record_every = min(whole_number("record_every", record_every), 2**53)
     row[at.RECORD_EVERY] = record_every

@@ -8,11 +8,11 @@ question is asked of the whole state, and the drive is followed until it is answ
 - held by friction while an integral grows is not rest.  Then every period adds the same to the state; the
   state is set forward to just before breakaway (`nonlinear.settling.drift`), and the drive is followed
   from there;
-- *limit cycle*: held by friction it stands a third time where it stood before, after equal times and swings
-  (to `ALIKE`): what follows from standing there is known, so it does so for ever.  Or of `PERIODS` swings or
-  more the later half is as large as the earlier, of the motor, too, and an event, a limit or a sensor's
-  counts are in it, as a linear drive has none.  (A load that nothing damps swings on, at any size, while the
-  motor comes to rest: no cycle.)  Which one a drive ends in may depend on the step;
+- *limit cycle*: held by friction it breaks away a third time from one place in one direction, after equal
+  times and swings (to `ALIKE`): what follows from there is known, so it does so for ever.  Or of `PERIODS`
+  swings or more the later half is as large as the earlier, of the motor, too, and an event, a limit or a
+  sensor's counts are in it, as a linear drive has none.  (A load that nothing damps swings on, at any size,
+  while the motor comes to rest: no cycle.)  Which one a drive ends in may depend on the step;
 - *diverging*: no finite state, or a motion that still grows at the end of the work;
 - *still moving*: none of these within `MOST_WORK` ticks and integration steps, as a stiff drive takes
   thousands of steps a tick.
@@ -110,7 +110,8 @@ class _Watch:
     seen: list[Floats] = field(default_factory=list)  # per piece: reference, followed, motor
     ranges: list[tuple[Floats, Floats]] = field(default_factory=list)  # per piece, of _RANGED
     acted: list[tuple[int, int, int]] = field(default_factory=list)  # entries, flags, events
-    stood: list[_Stand] = field(default_factory=list)  # before it broke away
+    left: list[Floats] = field(default_factory=list)  # per piece, of each breakaway: `_breakaways`
+    leaps: int = 0  # over waits
     scales: drift.Scales = field(init=False)
     period_s: float = field(init=False)
 
@@ -126,10 +127,10 @@ class _Watch:
             piece = self._advance(periods)
             if piece.status != "ok":
                 return self._rest("diverging")
-            stood = len(self.stood)
+            leaps = self.leaps
             if self.quiet():
                 return self._rest("at rest")
-            if len(self.stood) > stood and (cycle := self._returns()) is not None:
+            if self.leaps > leaps and (cycle := self._returns()) is not None:
                 return self._rest("limit cycle", *cycle)
             if len(self.seen) >= due:
                 due += due // 2
@@ -156,7 +157,22 @@ class _Watch:
         ranged = piece.columns[_RANGED]
         self.ranges.append((ranged.min(axis=1), ranged.max(axis=1)))
         self.scales.take(self.drive, piece)
+        self.left.append(self._breakaways())
         return piece
+
+    def _breakaways(self) -> Floats:
+        """Time, entry, place (followed, motor) and direction, a column each, of breakaways in the last piece.
+
+        It stands while it moves no further in an entry than its share of what a window may (`drift.small`).
+        """
+        times, seen = np.concatenate(self.times[-2:]), np.concatenate(self.seen[-2:], axis=1)
+        new = max(times.size - self.times[-1].size - 2, 0)  # whether the last entry before left is known now
+        times, places = times[new:], seen[1:, new:]
+        steps = np.diff(places, axis=1)
+        moves = np.abs(steps).max(axis=0) > self._least / drift.DRIFT
+        last = np.flatnonzero(moves[1:] & ~moves[:-1]) + 1
+        entries = sum(one[0] for one in self.acted) - times.size + last
+        return np.stack([times[last], entries, *places[:, last], np.sign(steps[:, last].sum(axis=0))])
 
     @property
     def spent(self) -> bool:
@@ -216,9 +232,7 @@ class _Watch:
             return False
         windows = drift.leap(drive, places, step, before, scale)
         self.periods += windows * drift.DRIFT
-        if windows:
-            followed, motor = (float(values[-1]) for values in self.seen[-1][1:])
-            self.stood.append(_Stand(self.period_s * self.periods, len(self.seen), followed, motor))
+        self.leaps += windows > 0
         return windows >= drift.MOST_LEAPS
 
     def _wait_for_overload(self) -> None:
@@ -229,29 +243,28 @@ class _Watch:
         self.periods += windows * drift.DRIFT
 
     def _returns(self) -> tuple[_Swing, int] | None:
-        """The swing between two returns to where the drive stands, and its first piece; None: not yet known.
+        """The swing between breakaways from one place in one direction, and its first entry; None: not known.
 
         As near as a count of the sensors, or `STILL` of the largest angle, is the same place.
         """
-        p = self.drive.p
+        p, left = self.drive.p, np.concatenate(self.left, axis=1)
         counts = p[at.COUNTS_PER_RAD] * p[at.RATIO], p[at.POSITION_COUNTS]
         far = max([self._least, *(1.0 / each for each in counts if each > 0.0)])
-        places = np.array([(one.followed, one.motor) for one in self.stood])
-        near = np.abs(places - places[-1]).max(axis=1) <= far
-        came = np.flatnonzero(near & ~np.append(near[1:], [False]))[::-1]  # last of each stay
-        visits = [self.stood[k] for k in came]
-        for turns in range(1, (len(visits) - 1) // 2 + 1):
-            now, before, first = (visits[k * turns] for k in range(3))
-            if not _alike(now.time_s - before.time_s, before.time_s - first.time_s):
+        near = np.abs(left[2:4] - left[2:4, -1:]).max(axis=0, initial=0.0) <= far
+        times, entries = left[:2, near & (left[4] == left[4, -1:])][:, ::-1]
+        for turns in range(1, (times.size - 1) // 2 + 1):
+            before, now = -np.diff(times[: 2 * turns + 1 : turns])[::-1]
+            if not _alike(before, now):
                 continue
-            span = self._span(before.piece, now.piece)
-            if span > far and _alike(span, self._span(first.piece, before.piece)):
-                return _Swing(2, 1.0 / (now.time_s - before.time_s), alike=True), before.piece
+            first, middle, last = entries[2 * turns :: -turns].astype(int)
+            span = self._span(middle, last)
+            if span > far and _alike(span, self._span(first, middle)):
+                return _Swing(2, 2.0 / (before + now), alike=True), middle
         return None
 
     def _span(self, start: int, end: int) -> float:
-        """Of what moves most between two pieces."""
-        return float(np.ptp(np.concatenate(self.seen[start:end], axis=1)[1:], axis=1).max())
+        """Of what moves most between two entries."""
+        return float(np.ptp(np.concatenate(self.seen, axis=1)[1:, start:end], axis=1).max())
 
     def _still(self, piece: Piece) -> bool:
         """Whether all signals keep their values; of a speed drive, all but the angles."""
@@ -322,9 +335,9 @@ class _Watch:
         return _swing_of(times[half], seen[1 + int(np.argmax(np.ptp(seen[1:, half], axis=1))), half])
 
     def _rest(self, verdict: Verdict, swing: _Swing | None = None, since: int | None = None) -> Rest:
-        """What is known by now; of the last half of the entries, or of the pieces ``since`` one."""
-        seen = np.concatenate(self.seen[since:], axis=1)
-        command, followed, motor = seen[:, seen.shape[1] // 2 if since is None else 0 :]
+        """What is known by now; of the last half of the entries, or of those ``since`` one."""
+        seen = np.concatenate(self.seen, axis=1)
+        command, followed, motor = seen[:, seen.shape[1] // 2 if since is None else since :]
         still, p = verdict == "at rest", self.drive.p
         acted = self._late()[: 1 if still else None]
         end = followed[-1] if still else 0.5 * (followed.max() + followed.min())
@@ -341,16 +354,6 @@ class _Watch:
             after_s=self.periods * self.period_s,
             work=self.drive.work,
         )
-
-
-@dataclass(frozen=True)
-class _Stand:
-    """Where a drive stands that friction holds: when, after how many pieces, what follows, the motor."""
-
-    time_s: float
-    piece: int
-    followed: float
-    motor: float
 
 
 @dataclass(frozen=True)

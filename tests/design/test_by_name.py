@@ -78,7 +78,8 @@ def test_anything_else_is_refused_in_one_line(given: object) -> None:
 @pytest.mark.parametrize("ask", [
     analyses.evaluate_requirements, friction_effects, analyses.large_signals, analyses.sawtooth,
     specification, stiffness, analyses.survey_loops, analyses.tune, analyses.validate,
-    lambda name: monte_carlo(name, "nowhere"), lambda name: analyses.amplitude_map(name, None),
+    lambda name: monte_carlo(name, "nowhere"),
+    lambda name: analyses.amplitude_map(name, assemble_loops(DESIGN)),
     corners, duty, failures, limit_cycles, margins, c_export, controller_export, fmu_bytes,
 ])  # fmt: skip
 def test_every_analysis_of_a_design_takes_its_name(ask) -> None:
@@ -167,22 +168,22 @@ def test_a_bad_argument_is_an_input_error_that_says_what_is_allowed(name: str) -
 
 
 @pytest.mark.parametrize(("ask", "words"), [
-    (lambda: sweep(DESIGN, None, [1]), "key = None: allowed: a dotted key"),
+    (lambda: sweep(DESIGN, None, [1]), "path = None: must be text"),
     (lambda: MeasuredResponse.from_coherence(THREE, [0.5, 1.2, 0.9], 8), "(0, 1]"),
     (lambda: MeasuredResponse.from_coherence(THREE, [0.5, 0.0, 0.9], 8), "(0, 1]"),
     (lambda: MeasuredResponse.with_noise(THREE, np.inf), "finite and not negative"),
     (lambda: delay_budget("ilr33-amber", "velocity", "a"), "frequency_rad_s = 'a'"),
     (lambda: onset(assemble_loops(DESIGN), "a"), "omega_rad_s = 'a'"),
     (lambda: onset(assemble_loops(DESIGN), float("nan")), "omega_rad_s = nan"),
-    (lambda: onset(assemble_loops(DESIGN), 1.0, 3), "bias = 3"),
+    (lambda: onset(assemble_loops(DESIGN), 1.0, 3), "bias = 3: must be a dict or None"),
     (lambda: onset(assemble_loops(DESIGN), 1.0, {"curent": 1.0}), "curent"),
-    (lambda: onset("ilr33-amber", 1.0), "assemble_loops"),
-    (lambda: Probe(point="u", gain="x"), "probe gain = 'x'"),
+    (lambda: onset("ilr33-amber", 1.0), "must be a Loops (actuator_lti"),
+    (lambda: Probe(point="u", gain="x"), "gain = 'x': must be a number"),
     (lambda: simulate(DESIGN, commands.step(0.01), 0.01, progress=5), "progress = 5"),
     (lambda: simulate(DESIGN, commands.step(0.01), 0.01, tanh_tolerance=0), "tanh_tolerance = 0"),
     (lambda: simulate(DESIGN, commands.step(0.01), 0.01, friction_on="x"), "friction_on"),
     (lambda: DESIGN.with_law("velocity", control.tf([1.0, 0.0], [1.0], 1e-3), ["error"]), "system: improper"),
-    (lambda: sweep(DESIGN, "limits.voltage", "10 V"), "allowed: several"),
+    (lambda: sweep(DESIGN, "limits.voltage", "10 V"), "must be several"),
     (lambda: DESIGN.with_law("velocity", ([],) * 4 + (1e-4,), []), "inputs = an empty list: allowed: a list"),
 ])  # fmt: skip
 def test_a_refusal_names_what_is_wrong(ask, words: str) -> None:

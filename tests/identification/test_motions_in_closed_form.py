@@ -98,6 +98,17 @@ def test_the_intervals_hold_a_bend_that_is_too_small_to_be_sure() -> None:
     assert np.sqrt(np.mean(np.square(off))) < 1.3
 
 
+def test_a_bend_of_a_millionth_of_the_drive_fails_no_record() -> None:
+    """28 standard errors of a record without noise, where simulated records err by as much."""
+    time, position, speed, acceleration = _sines(np.random.default_rng(1), 4000)
+    bent = 1e-3 * np.exp(-np.abs(speed) / 0.05) * np.sign(speed)
+    model = _fitted(time, position, MASS * acceleration + VISCOUS * speed + OFFSET + bent)
+    bend = bend_of(model)
+    assert bend.chance < 1e-6
+    (item,) = law_items(bend, model, "linear")
+    assert item.passed
+
+
 def _first_order_step(inertia: float) -> tuple[np.ndarray, ...]:
     """Time, position and force of a speed that rises to 0.2 m/s: the acceleration is what it lacks."""
     time, constant = 1e-3 * np.arange(3000), 0.05

@@ -220,7 +220,7 @@ def test_operating_points_of_the_friction() -> None:
     ({"design": amber(encoder=Encoder(speed="tracking"))}, "bandwidth"),
     ({"operating_point": "driving"}, "no coupling"),
     ({"inner_loops": "half"}, "inner_loops"),
-    ({"form": "discrete"}, "^form = 'discrete': one of sampled, continuous, ideal$"),
+    ({"form": "discrete"}, "^form = 'discrete': must be one of sampled, continuous, ideal$"),
     ({"operating_point": "moving"}, "operating_point = 'moving'"),
     ({"operating_point": "describing-function"}, "speed_amplitude_rad_s"),
     ({"operating_point": "rest", "speed_amplitude_rad_s": 3.0}, "rad_s = 3.0: .*'rest' has none"),

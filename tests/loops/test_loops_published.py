@@ -219,9 +219,9 @@ def test_a_current_command_closes_the_current_loop() -> None:
 
 
 @pytest.mark.parametrize(("name", "bad", "words"), [
-    ("joint", {"form": "zoh"}, "form = 'zoh': one of sampled, continuous, ideal"),
-    ("joint", {"rotor": "held"}, "rotor = 'held': free or locked"),
-    ("joint", {"command": "w_ref"}, "command = 'w_ref': one of u, i_ref"),
+    ("joint", {"form": "zoh"}, "form = 'zoh': must be one of sampled, continuous, ideal"),
+    ("joint", {"rotor": "held"}, "rotor = 'held': must be one of free, locked"),
+    ("joint", {"command": "w_ref"}, "command = 'w_ref': must be one of u, i_ref"),
     ("emps", {"command": "i_ref"}, "emps has no current loop"),
     ("emps", {"rotor": "locked"}, "the design has no current"),
 ])  # fmt: skip

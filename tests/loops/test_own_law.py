@@ -163,7 +163,7 @@ def test_a_run_starts_from_states_of_the_law() -> None:
     rested = simulate(design, commands.step(0.01), 0.1, limits_on=False).output_angle_rad
     assert np.ptp(runs[0] - rested) > 1e-6
     np.testing.assert_allclose(runs[1], runs[0], rtol=0, atol=1e-11)
-    for wrong in ((1.0, 2.0), (np.nan,)):
+    for wrong in ((1.0, 2.0), (np.inf,)):
         with pytest.raises(InputError, match=r"initial\.law = .*allowed: 1 numbers"):
             simulate(as_law(design, "velocity"), commands.step(0.01), 0.1, initial=State(law=wrong))
 

@@ -16,6 +16,7 @@ from actuator_lti.design import load_design, model, with_values
 from actuator_lti.drive.profile import CommandMean, profile_note
 from actuator_lti.loops import PeriodicLoop, exact_margins, periodic_loop
 from actuator_lti.loops.periodic import GAINS, first_border
+from actuator_lti.loops.tick import Block, mean_response
 from actuator_lti.systems.resolvent import responses
 from analyses.linear.loop_figures import all_loop_figures
 from nonlinear.bench.operating_motion import on_its_stand, on_the_bench
@@ -170,6 +171,23 @@ def test_the_time_invariant_system_of_the_fundamental_says_the_same(point: str) 
     z = np.exp(1j * np.geomspace(1e-4, 3.1, 40))
     whole = responses(loops.break_points[point].plain_open, z)
     np.testing.assert_allclose(periodic_loop(loops, point)(z), whole, rtol=1e-8)
+
+
+@pytest.mark.parametrize("late", [5, 40, 150])
+def test_a_response_behind_many_samples_of_delay_keeps_its_digits(late: int) -> None:
+    """z^-d/(z - a) + z^-d/(z - b), alone and stacked, with states of very different size."""
+    chain = np.eye(late, k=-1)
+    A = np.block([[np.diag([0.5, 0.999]), np.zeros((2, late))], [np.zeros((late, 2)), chain]])
+    A[:2, -1] = 1.0, 1e6
+    B, C = np.zeros((late + 2, 1)), np.zeros((1, late + 2))
+    B[2], C[0, :2] = 1.0, (1.0, 1e-6)
+    z = np.exp(1j * np.geomspace(1e-4, 3.1, 60))
+    truth = z**-late * (1.0 / (z - 0.5) + 1.0 / (z - 0.999))
+    D = np.zeros((1, 1))
+    np.testing.assert_allclose(responses(Block(A, B, C, D, ()), z), truth, rtol=1e-12)
+    both = (np.stack([A, A])[:, None], B, np.stack([C, 2.0 * C])[:, None], D)
+    found = mean_response([both], z[:, None, None])[..., 0, 0]
+    np.testing.assert_allclose(found, [truth, 2.0 * truth], rtol=1e-12)
 
 
 def test_a_slow_filter_of_the_command_moves_no_margin() -> None:

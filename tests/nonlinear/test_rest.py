@@ -169,6 +169,21 @@ def test_a_gimbal_with_a_spring_and_a_steering_motor_with_play_hunt() -> None:
     assert steering.amplitude < 0.2 * steering.motor_amplitude
 
 
+@pytest.mark.parametrize("load_Nm", [0.0, 100.0, 200.0])
+@pytest.mark.parametrize("every", [2, 10])
+def test_a_valve_that_stands_for_seconds_swings_as_often_as_its_record_passes_the_middle(every, load_Nm):
+    """0.2625 Hz: every stand is shorter than the look for one, which finds one in three."""
+    design = with_values(load_design(HERE / "valve.toml"), {"control.position.every": every})
+    rest = settle(design, load_Nm, 0.166 / DEG).rest
+    run = simulate(design, commands.step(0.166 / DEG), 60.0, load_Nm=load_Nm)
+    late = run.output_angle_rad[run.time_s.size // 4 :]
+    above = late > 0.5 * (late.max() + late.min())
+    rises = np.flatnonzero(above[1:] & ~above[:-1]) * run.period_s
+    period_s = (rises[-1] - rises[0]) / (rises.size - 1)
+    assert rises.size > 9
+    assert rest.frequency_hz == pytest.approx(1.0 / period_s, rel=0.01)
+
+
 @pytest.mark.parametrize("share", [0.01, 0.05, 0.25, 1.0])
 @pytest.mark.parametrize("counts", [586, None])
 def test_a_coarse_encoder_read_by_difference_never_settles(counts: int | None, share: float) -> None:

@@ -151,6 +151,15 @@ def test_cycles_of_the_fin_s_play_are_found_by_the_simulator() -> None:
     assert seen.frequency_hz == pytest.approx(attracting.frequency_hz, rel=0.1)
 
 
+@pytest.mark.parametrize("slope", ["40 N*m/rad", "150 N*m/rad"])
+def test_a_load_that_tips_over_within_the_play_makes_no_cycle_there(slope: str) -> None:
+    """It goes away and does not turn back: that was a cycle of twenty minutes, and simulated for as long."""
+    pushed = with_overrides(FIN, {"load.moment_slope": slope})
+    (cycle,) = cycles_of_play(pushed, friction=False)
+    assert cycle.stable
+    assert confirm(pushed, cycle).ratio == pytest.approx(1.0, abs=0.1)
+
+
 def test_no_cycle_is_found_where_there_is_none() -> None:
     """Friction quiets the fin; no play; the motor's counts are in the speed alone (model.md section 2)."""
     assert cycles_of_play(FIN, friction=True) == ()

@@ -251,8 +251,9 @@ def test_what_passes_between_two_updates_is_a_ripple_where_it_swings_by_nothing_
 def test_a_swing_too_small_to_count_is_rest_for_all_who_ask(millionths: float, verdict: str) -> None:
     """The joint hunts by its counts; beside a full deflection of two or half a million such swings."""
     joint, step = load_design("joint"), 1e-3
-    run = simulate(joint, commands.step(step), 0.5)
-    swing = settle(joint, 0.0, step).swing_rad
+    rest = settle(joint, 0.0, step).rest
+    run, short = (simulate(joint, commands.step(step), part / rest.frequency_hz) for part in (1.1, 0.9))
+    swing = max(rest.amplitude, rest.motor_amplitude)
     full = 1e6 * swing / millionths
     design = changed(joint, validation={"full_deflection_rad": full})
     assert settle(design, 0.0, step).rest.verdict == "limit cycle"  # as the drive moves, whoever looks
@@ -260,6 +261,7 @@ def test_a_swing_too_small_to_count_is_rest_for_all_who_ask(millionths: float, v
     said, result = section(Motion(design, Asked(), run)), conduct(run, full)
     assert result.status == ("comes to rest" if verdict == "at rest" else verdict)
     assert result.detail.startswith("a swing of ±") == (verdict == "at rest")
+    assert (conduct(short, full).said == "") == (verdict == "at rest")  # no swing that it did not see
     assert result.status in said["result"]
     assert said["status"] == ("info" if result.wanted else "warn")
 
