@@ -25,18 +25,23 @@ def signals_at(
     The voltage is that of the last tick before the times themselves. Without ``later_s`` it is not known
     when the ticks are: all signals are in straight lines between them.
     """
-    (tick, late), (at, _) = (_placed(run, time_s + more) for more in (later_s or 0.0, 0.0))
-    rate, ratio, voltage = run.output_speed_rad_s, design.total_ratio, run.voltage_V[at]
+    rate, ratio = run.output_speed_rad_s, design.total_ratio
     speed = run.motor_speed_rad_s / ratio if rate is None else rate
-    columns = (run.motor_angle_rad, run.motor_speed_rad_s, run.current_A, run.output_angle_rad, speed)
-    after, share = np.minimum(tick + 1, len(run.time_s) - 1), late / run.period_s
-    made = np.array([one[tick] + share * (one[after] - one[tick]) for one in columns])
+    columns = run.motor_angle_rad, run.motor_speed_rad_s, run.current_A, run.output_angle_rad, speed
     if later_s is None:
-        voltage = voltage + share * (run.voltage_V[after] - voltage)
-    elif np.any(late):
-        bent = _bent(design, run, tick, late)
-        made[:3] += bent
-        made[3:] += bent[:2] / ratio if rate is None else 0.0
+        *made, voltage = (np.interp(time_s, run.time_s, one) for one in (*columns, run.voltage_V))
+    else:
+        (tick, late), (at, _) = (_placed(run, time_s + more) for more in (later_s, 0.0))
+        after, share, voltage = (
+            np.minimum(tick + 1, len(run.time_s) - 1),
+            late / run.period_s,
+            run.voltage_V[at],
+        )
+        made = [one[tick] + share * (one[after] - one[tick]) for one in columns]
+        if np.any(late):
+            bent = _bent(design, run, tick, late)
+            made[:3] = np.add(made[:3], bent)
+            made[3:] = np.add(made[3:], bent[:2] / ratio if rate is None else 0.0)
     angle, motor, current, output, speed = made
     return {
         "angle": angle,

@@ -32,7 +32,6 @@ FIRST_ROWS = 50
 ANSWERS = ("angle", "output_angle", "position", "speed", "velocity", "current", "force")
 """What tells when a step of the command acted, the surest first."""
 STEP_ROUNDS = 6
-HOLD_ROUNDING = 1e-3  # of a tick
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -240,9 +239,13 @@ def _with_steps(
     series = signals_at(driven.design, made, time, ticks)
     name = next((name for name in ANSWERS if name in measured), "")
     for _ in range(STEP_ROUNDS if driven.early_s is None and len(early) and name else 0):
-        least, most = _more_ticks(driven, time, early)
+        least, most = (
+            ticks_early(driven.design, time) if driven.hold is None else driven.hold.more_ticks(early)
+        )
         more = driving.earlier_s(driven, time, measured[name], series[name])
-        moved = early + tick * np.clip(np.round(more / tick), least, most)
+        moved = tick * np.clip(np.round((early + more) / tick), least, most)
+        if driven.hold is not None:
+            moved = early + tick * np.clip(np.round(more / tick), least, most)
         if np.array_equal(moved, early):
             break
         other = run(moved)
@@ -266,16 +269,6 @@ def later_s(design: Design, record: Record) -> tuple[float, float] | None:
     if driven.hold is None or driven.hold.is_whole:
         return None
     return driven.hold.more_s(driven.likely_s)
-
-
-def _more_ticks(driven: driving.Driven, time: Floats, early_s: Floats) -> tuple[Floats, Floats]:
-    """By how many ticks less and more early each step may be taken."""
-    tick = driven.design.controller.period_s
-    if driven.hold is not None:
-        least, most = np.array(driven.hold.more_s(early_s)) / tick
-        return np.ceil(least - HOLD_ROUNDING), np.floor(most + HOLD_ROUNDING)
-    least, most = ticks_early(driven.design, time)
-    return np.asarray(least - early_s / tick), np.asarray(most - early_s / tick)
 
 
 def ticks_early(design: Design, time_s: Floats) -> tuple[float, float]:

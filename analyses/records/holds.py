@@ -61,6 +61,11 @@ class Hold:
         moved = 0.0 if least <= 0.0 <= most else self.tick_s * np.round(0.5 * (least + most) / self.tick_s)
         return least - moved, most - moved - OPEN * self.tick_s
 
+    def more_ticks(self, early_s: Floats) -> tuple[float, float]:
+        """The same in whole ticks."""
+        least, most = self.more_s(early_s)
+        return float(np.ceil(least / self.tick_s - ON_TICKS)), float(np.floor(most / self.tick_s + ON_TICKS))
+
 
 def hold_of(rows: Ints, count: int, row_s: float, tick_s: float) -> Hold | None:
     """The longest hold of whole ticks with which each jump lies between its row and the one before.
