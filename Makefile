@@ -21,8 +21,10 @@ COMPILE := $(BIN)/pip-compile --quiet --generate-hashes --allow-unsafe --strip-e
 # libraries anew, which doubles the time of its start.
 unexport PYTHONDONTWRITEBYTECODE
 BOTH_CORES := --jobs=2
+# Each process takes tests that lie together, and goes on with the other's last ones: what a file makes is made once.
+ON_BOTH := -n 2 --dist worksteal
 
-.PHONY: page style types contracts d3 differential newest newest-wheel newest-report installs wasm report test test-all machines check bench clean install browser fuzz lock limits docs release
+.PHONY: page style types contracts doctests d3 differential newest newest-wheel newest-report installs wasm report test test-all machines check bench clean install browser fuzz lock limits docs release
 
 # The main job.
 report: $(CORE)
@@ -32,10 +34,10 @@ report: $(CORE)
 
 test: $(ALL)
 	@echo "tests, on two cores; make test-all has the slow ones too"
-	@$(BIN)/python -m pytest -q -n 2 -m "not slow"
+	@$(BIN)/python -m pytest -q $(ON_BOTH) -m "not slow"
 
 test-all: $(ALL)
-	$(BIN)/python -m pytest -n 2
+	$(BIN)/python -m pytest $(ON_BOTH)
 
 install: $(ALL)
 
@@ -64,13 +66,13 @@ MACHINE_TESTS := tests/margins/test_margin_reference_loops.py tests/margins/test
   tests/margins/test_bandwidth.py tests/loops/test_loops_forms.py tests/loops/test_loops_published.py \
   tests/loops/test_rest_mode.py tests/study/test_compiled_figures.py \
   tests/validation/test_limit_cycles.py tests/reports/test_certified_report.py tests/identification/test_response_fit.py
-AS_MACHINE := $(BIN)/python -m pytest -q -n 2 -m "not slow" $(MACHINE_TESTS)
+AS_MACHINE := $(BIN)/python -m pytest -q -p no:cacheprovider -m "not slow" $(MACHINE_TESTS)
 
+# Two machines at once.
 machines: $(ALL)
-	@set -e; for kernel in $$($(BIN)/python tests/machines/machine_kinds.py); do \
-	  echo "OPENBLAS_CORETYPE=$$kernel"; OPENBLAS_CORETYPE=$$kernel $(AS_MACHINE); done
-	@set -e; for seed in $(PROCESSORS); do \
-	  echo "OTHER_PROCESSOR=$$seed"; OTHER_PROCESSOR=$$seed $(AS_MACHINE); done
+	@set -e; kernels=$$($(BIN)/python tests/machines/machine_kinds.py); \
+	printf '%s\n' $$kernels $(PROCESSORS:%=OTHER_PROCESSOR=%) | \
+	  xargs -P 2 -I MACHINE sh -c 'env MACHINE $(AS_MACHINE) && echo "as MACHINE: passed" || { echo "as MACHINE: FAILED"; exit 1; }'
 
 # The page's scripts: types, rules, and their pure parts by node's own runner.
 page:
@@ -92,9 +94,11 @@ types: $(ALL)
 contracts: $(ALL)
 	$(BIN)/lint-imports
 
+doctests: $(ALL)
+	$(BIN)/python -m pytest -q --doctest-modules actuator_lti nonlinear analyses reports
+
 check: $(ALL)
-	$(MAKE) $(BOTH_CORES) types page style contracts
-	$(BIN)/python -m pytest -q -n 2 --doctest-modules actuator_lti nonlinear analyses reports
+	$(MAKE) $(BOTH_CORES) types doctests page style contracts
 
 # Damaged files and extreme values for every loader and command: make fuzz SECONDS=3600 SEED=7
 fuzz: $(ALL)

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from actuator_lti.errors import InputError
+from actuator_lti.errors import InputError, shown
 from actuator_lti.systems.plain_system import period_of
 from actuator_lti.types import Real
 
@@ -95,7 +95,7 @@ def given_of(system: Any) -> Given:
     if not hasattr(system, "ninputs") or not (hasattr(system, "num") or hasattr(system, "A")):
         inner = "; of a Loop its open_loop" if hasattr(system, "open_loop") else ""
         raise InputError(
-            f"{type(system).__name__}: allowed: a StateSpace, TransferFunction, DelaySystem or "
+            f"system = {shown(system)}: allowed: a StateSpace, TransferFunction, DelaySystem or "
             f"FrequencyResponseData, or a linear system of scipy.signal{inner}"
         )
     if system.ninputs != 1 or system.noutputs != 1:

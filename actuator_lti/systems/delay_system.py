@@ -100,7 +100,7 @@ class DelaySystem(ControlFace):
             return cls([], [], [], [], [], [[float(system)]], [], [], [], [], **names)
         if not isinstance(system, control.StateSpace | control.TransferFunction):
             allowed = "a continuous StateSpace or TransferFunction, or a number"
-            raise InputError(f"{type(system).__name__}: {allowed}")
+            raise InputError(f"system = {shown(system)}: {allowed}")
         if not system.isctime():
             raise InputError(f"a sampled system (dt = {system.dt}) cannot be joined to a continuous one")
         labels = {"inputs": system.input_labels, "outputs": system.output_labels} | names

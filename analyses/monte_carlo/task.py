@@ -129,7 +129,8 @@ class StepCheck:
 
     def __post_init__(self) -> None:
         if not (0 < self.amplitude_rad < np.inf and 0 < self.duration_s <= 100.0):
-            raise InputError("nonlinear step: an amplitude above 0 and a duration above 0, at most 100 s")
+            given = f"amplitude_rad = {self.amplitude_rad:g}, duration_s = {self.duration_s:g}"
+            raise InputError(f"nonlinear step: {given}: must be above 0, a duration at most 100 s")
         finite_number("load_Nm", self.load_Nm)
 
 

@@ -42,7 +42,7 @@ from analyses.failures import failures
 from analyses.friction_effects import friction_effects
 from analyses.limit_cycles import limit_cycles
 from analyses.margins import margins
-from analyses.monte_carlo import monte_carlo
+from analyses.monte_carlo import StepCheck, monte_carlo
 from analyses.specification import specification
 from analyses.stiffness import stiffness
 from nonlinear import Drive, Probe, commands, simulate
@@ -184,6 +184,8 @@ def test_a_bad_argument_is_an_input_error_that_says_what_is_allowed(name: str) -
     (lambda: simulate(DESIGN, commands.step(0.01), 0.01, friction_on="x"), "friction_on"),
     (lambda: DESIGN.with_law("velocity", control.tf([1.0, 0.0], [1.0], 1e-3), ["error"]), "system: improper"),
     (lambda: sweep(DESIGN, "limits.voltage", "10 V"), "must be several"),
+    (lambda: stability_margins(5), "system = 5: allowed: a StateSpace"),
+    (lambda: StepCheck(-1.0), "amplitude_rad = -1, duration_s = 0.5: must be above 0"),
     (lambda: DESIGN.with_law("velocity", ([],) * 4 + (1e-4,), []), "inputs = an empty list: allowed: a list"),
 ])  # fmt: skip
 def test_a_refusal_names_what_is_wrong(ask, words: str) -> None:

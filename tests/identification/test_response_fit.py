@@ -129,7 +129,7 @@ def test_intervals_hold_what_they_say(tmp_path) -> None:
     assert all(one.passed for one in results)
 
 
-@pytest.mark.parametrize(("of", "seed"), [("L", 4), ("L", 5), ("T", 0), ("T", 4)])
+@pytest.mark.parametrize(("of", "seed"), [("L", 4), ("T", 0)])
 def test_a_response_far_below_the_resonance_does_not_tell_the_spring(of: str, seed: int, tmp_path) -> None:
     """To a quarter of the antiresonance, 24 Hz: what is told is the truth, all that is kept being the truth.
 

@@ -42,4 +42,4 @@ def own() -> str:
 
 
 if __name__ == "__main__":
-    sys.stdout.write("".join(f"{name}\n" for name in kernels() if name != own()))
+    sys.stdout.write("".join(f"OPENBLAS_CORETYPE={name}\n" for name in kernels() if name != own()))
