@@ -51,11 +51,12 @@ def check_motor(design: Design) -> Iterator[Refusal]:
                 yield f"motor.{key}", value, "not allowed beside motor.source_gain"
         return
     for key, value in given.items():
-        if value is None:
+        taken = key == "back_emf_constant" and "motor.constants" in design.written
+        if value is None and not (taken and given["torque_constant"] is not None):
             words = "R, L, kM and kE together, or motor.source_gain alone"
             yield f"motor.{key}", "", f"missing; allowed: {words}{_without(key, design)}"
     kM, kE = _constants(design)
-    if kM is not None and kE is not None and _apart(kM, kE):
+    if given["back_emf_constant"] is not None and kM is not None and _apart(kM, kE):
         key, wanted = "back_emf_constant", given["back_emf_constant"] * kM / kE
         over = _TORQUE_OVER_VOLTAGE[design.motor.constants][1]
         same = f'with motor.constants = "{design.motor.constants}" kE is kM over {over} in SI'
@@ -154,6 +155,13 @@ def _without(key: str, design: Design) -> str:
     if key == "inductance":
         small = "0.1 to 1 ms of a small motor"
         return f"; where the sheet has none, R times the electrical time constant, {small}"
+    if same := as_one_constant(key, design):
+        return f"; {'taken if motor.constants is stated: ' * (key == 'back_emf_constant')}{same}"
+    return ""
+
+
+def as_one_constant(key: str, design: Design) -> str:
+    """What kM or kE has to be by the other one; empty where that is not given."""
     other = {"torque_constant": "back_emf_constant", "back_emf_constant": "torque_constant"}.get(key)
     held = getattr(design.motor, _ELECTRICAL[other]) if other else None
     if held is None or held is UNREAD:
@@ -165,7 +173,7 @@ def _without(key: str, design: Design) -> str:
     if design.screw is not None:  # constants of the motor's own shaft
         p, axis = design.screw.travel_m_rad, "rotary"
     number = held * p * (ratio if torque else 1.0 / ratio)
-    return f"; {same} in SI, {number:g} {axis_unit(axis, f'motor.{key}')}"
+    return f"{same} in SI, {number:g} {axis_unit(axis, f'motor.{key}')}"
 
 
 def check_temperature(design: Design) -> Iterator[Refusal]:

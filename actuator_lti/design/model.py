@@ -254,6 +254,8 @@ class Design:
         }
         stated = {name: getattr(motor, name) for name in factors}
         same = {name: value * factors[name] for name, value in stated.items() if value is not None}
+        if motor.torque_constant_Nm_A is not None:
+            same.setdefault("back_emf_constant_Vs_rad", same["torque_constant_Nm_A"])  # one constant
         return replace(motor, **same, constants="dc")
 
 

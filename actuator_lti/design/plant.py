@@ -39,7 +39,8 @@ class Motor:
     torque_constant_Nm_A: Annotated[float | None, positive("torque per ampere", "kM",
         example="5.9 mN*m/A")] = None
     back_emf_constant_Vs_rad: Annotated[float | None, positive("back-EMF per rad/s; a speed constant, 83.4 "
-        "rpm/V, is turned over (of peak-phase it is line-line)", "kE", example="5.9 mV*s/rad")] = None
+        "rpm/V, is turned over (of peak-phase it is line-line); default kM in SI where constants is stated",
+        "kE", example="5.9 mV*s/rad")] = None
     source_gain_Nm_V: Annotated[float | None, positive("gain of an ideal torque source, instead of R, L, "
         "kM, kE", "g", example="35.15 N/V")] = None
     cogging_Nm: Annotated[float, not_negative("cogging or torque ripple: peak of a torque sin(Z angle + "

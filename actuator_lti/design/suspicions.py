@@ -4,6 +4,7 @@ from collections.abc import Iterator
 from contextlib import suppress
 from math import inf, isfinite, pi, sqrt
 
+from actuator_lti.design.checks_plant import as_one_constant
 from actuator_lti.design.data_sheet import FROM
 from actuator_lti.design.field import unit_on
 from actuator_lti.design.loader import as_design
@@ -13,6 +14,7 @@ from actuator_lti.design.reader import GAINS
 from actuator_lti.design.writing import read_value
 from actuator_lti.errors import InputError
 
+_BACK_EMF = "back_emf_constant"
 GRADES = {"", "A", "B", "C", "D", "X"}  # of a source, or several with "/" between
 
 
@@ -26,7 +28,7 @@ def warnings_of(design: Design) -> tuple[str, ...]:
     design = as_design(design)
     checks = (
         _sampling, _crossovers, _law, _limits, _unused, _unseen, _gears, _loads, _angles, _asked_for,
-        _pedigree, _encoder, elastic_warnings, kept_gains,
+        _pedigree, _encoder, _one_constant, elastic_warnings, kept_gains,
     )  # fmt: skip
     return tuple(line for check in checks for line in check(design))
 
@@ -79,6 +81,12 @@ def _crossovers(design: Design) -> Iterator[str]:
         if crossovers.get(outer, 0.0) > crossovers.get(inner, inf):
             above = f"crossover near {crossovers[outer]:.3g} rad/s lies above that of the {inner} loop"
             yield f"control.{outer}.gain: {above} inside it, {crossovers[inner]:.3g} rad/s"
+
+
+def _one_constant(design: Design) -> Iterator[str]:
+    """A back-EMF constant that is taken: nothing beside it tells a wrong convention."""
+    if design.motor.back_emf_constant_Vs_rad is None and (same := as_one_constant(_BACK_EMF, design)):
+        yield f"motor.{_BACK_EMF}: not given; {same}: a wrong motor.constants would not show"
 
 
 def _law(design: Design) -> Iterator[str]:

@@ -250,6 +250,7 @@ _ADVICE = {
     ("stiffness", "A/rad"): _GAIN_OF_TORQUE,
     ("count or line, by maker", "1"): 'write "{n:.15g} lines" ({lines:.15g} counts) or "{n:.15g} counts"',
     (_FREQUENCY, "1/s"): "a frequency in Hz becomes a gain in 1/s times 2 pi: {size:.6g} 1/s",
+    ("ratio", "A"): "of the motor's rated current it is {size:.4g} times that many amperes",
     ("mass", "m/s^2"): "1 g of a fall is 9.80665 m/s^2{fall}",
     ("mass", "N"): "a weight is written kgf",
     ("moment of inertia", "kg*m^2"): "GD2 is 4 J: J = {quarter:.4g} kg*m^2",
@@ -340,7 +341,7 @@ def parse_quantity(text: str | float | int, unit: str) -> float:
         raise InputError(f"must be finite; allowed: {example}")
     if flywheel or not compatible(result, wanted):
         wrong = f"wrong dimension, {_kind_of(written, result)}" if written else "has no unit"
-        advice = _advice(result, wanted, number)
+        advice = _advice(result, wanted, number) if written else ""
         raise (AdvisedError if advice else InputError)(
             f"{'a GD2' if flywheel else wrong}; allowed: {example}{advice}"
         )

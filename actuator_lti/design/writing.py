@@ -225,8 +225,9 @@ def unit_as_stated(design: Design, path: str) -> tuple[str, float]:
     That of SI where the file has none, or one in which half the number is not half the value (rpm/V).
 
     >>> from actuator_lti.design import load_design
-    >>> unit_as_stated(load_design("ilr33-amber"), "motor.rotor_inertia")
-    ('g*cm^2', 1e-07)
+    >>> unit, in_SI = unit_as_stated(load_design("ilr33-amber"), "motor.rotor_inertia")
+    >>> unit, f"{in_SI:g}"
+    ('g*cm^2', '1e-07')
     """
     known = design.parameters.get(path)
     with suppress(ValueError, ZeroDivisionError):

@@ -3,7 +3,15 @@
 import numpy as np
 import pytest
 
-from actuator_lti.design import Design, design_hash, load_design, read_design_text, with_values, write_design
+from actuator_lti.design import (
+    Design,
+    design_hash,
+    load_design,
+    read_design_text,
+    warnings_of,
+    with_values,
+    write_design,
+)
 from actuator_lti.design.writing import write_changed
 from actuator_lti.loops import assemble_loops
 from analyses.linear.loop_figures import all_loop_figures
@@ -106,20 +114,39 @@ def motor(constants: str, **values: str) -> str:
 
 
 @pytest.mark.parametrize(("constants", "values"), [
-    ("rms-line", {"torque_constant": "0.03 Nm/Arms"}),
     ("rms-line", {"back_emf_constant": "1.8 Vrms/krpm"}),
     ("peak-phase", {"back_emf_constant": "100 KV"}),
-    ("peak-phase", {"torque_constant": "0.08 Nm/A"}),
-    ("dc", {"torque_constant": "0.08 Nm/A"}),
     ("dc", {"back_emf_constant": "100 KV"}),
 ])  # fmt: skip
 def test_a_missing_constant_is_answered_with_the_number_that_is_then_taken(constants, values) -> None:
-    missing = "torque_constant" if "back_emf_constant" in values else "back_emf_constant"
     answer = " ".join(mistakes(motor(constants, **values)).split()[-2:])
-    design = read_design_text(motor(constants, **values, **{missing: answer}))
+    design = read_design_text(motor(constants, **values, torque_constant=answer))
     same = design.effective_motor
     # six digits are told
     assert same.torque_constant_Nm_A == pytest.approx(same.back_emf_constant_Vs_rad, rel=1e-5)
+
+
+@pytest.mark.parametrize(("constants", "kM", "kE"), [  # amplitudes of a phase: kM i = 1.5 k i, u = k w
+    ("rms-line", "0.03 Nm/Arms", f"{0.03 / 3**0.5!r} V*s/rad"),
+    ("peak-phase", "0.09 Nm/A", "0.06 V*s/rad"),
+    ("dc", "0.09 Nm/A", "0.09 V*s/rad"),
+])  # fmt: skip
+def test_a_back_emf_constant_that_a_sheet_does_not_state_is_its_torque_constant(constants, kM, kE) -> None:
+    """By energy, kM i w = kE w i, in the convention that is stated; without one kE would tell a wrong one."""
+    short = read_design_text(motor(constants, torque_constant=kM))
+    whole = read_design_text(motor(constants, torque_constant=kM, back_emf_constant=kE))
+    volts = short.effective_motor.back_emf_constant_Vs_rad
+    assert volts == pytest.approx(whole.effective_motor.back_emf_constant_Vs_rad, rel=1e-12)
+    again = with_values(read_design_text(write_design(short)), {"motor.torque_constant": 0.02})
+    assert again.effective_motor.back_emf_constant_Vs_rad == again.effective_motor.torque_constant_Nm_A
+    number = f"{float(kE.split()[0]):g} V*s/rad"
+    said = [line for line in warnings_of(short) if line.startswith("motor.back_emf_constant: not given")]
+    assert [number in line for line in said] == [True]
+    assert not any(line.startswith("motor.back_emf") for line in warnings_of(whole))
+    text = (
+        motor(constants, torque_constant=kM).replace(f'constants = "{constants}"\n', "").replace("Arms", "A")
+    )
+    assert "motor.back_emf_constant: missing" in mistakes(text)
 
 
 def test_kv_of_a_motor_per_phase_is_line_line_and_a_constant_missing_behind_a_screw_is_told_at_the_shaft():

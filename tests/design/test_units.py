@@ -143,6 +143,7 @@ def test_a_time_in_minutes_does_not_turn_the_speeds_read_after_it() -> None:
     ("120 rad/s", "1/s", "wrong dimension"),
     ("120 Hz", "1/s", "wrong dimension"),
     ("942 1/s", "rad/s", "wrong dimension"),
+    ("300 %", "A", "of the motor's rated current it is 3 times"),
     ("3 kg", "kg*m^2", "wrong dimension"),
     ("5.9 mN*m/A", "V*s/m", "wrong dimension"),
     ("55", "ohm", "no unit"),
