@@ -9,10 +9,10 @@ import numpy as np
 
 from actuator_lti.design.loader import AnyDesign, as_design
 from actuator_lti.design.model import Design
-from actuator_lti.drive.steady import motor_torque_Nm
 from actuator_lti.errors import InputError
 from actuator_lti.types import Floats, Progress
 from analyses.correlation import driving
+from analyses.correlation.between_ticks import likeliest_s, signals_at
 from analyses.correlation.compare import SignalComparison, compare_signals
 from analyses.correlation.following import followed, following_finding
 from analyses.records.consistency import Finding, because, check_record
@@ -182,11 +182,14 @@ def _nearest(
     command: str | None = None,
 ) -> _Modelled:
     """The reading of a command with which a run is nearest, that run and its signals."""
-    driven = driving.needed_command(design, record, command)
+    readings = driving.readings(driving.needed_command(design, record, command), record)
+    driven = readings[0]
     notes.extend(driven.notes)
     time, even = record.time_s - record.time_s[0], period_of(record) * np.arange(len(record))
     if (np.abs(time - even) <= 4.0 * np.spacing(np.abs(record.time_s).max())).all():
         time = even  # stamps of an epoch have few digits: a step of the command would miss its tick
+    if driven.hold is not None:
+        time = driven.hold.row_s * np.arange(len(record)) + driven.hold.ahead_s(driven.likely_s)
     supply = driving.supply_of(driven, record, time, notes)
     model, load = driving.load_of(driven.design, record, time, notes)
     period = model.controller.period_s
@@ -202,15 +205,14 @@ def _nearest(
     if moving is not initial:
         part = {name: values[:FIRST_ROWS] for name, values in measured.items()}
         until = float(time[:FIRST_ROWS][-1]) + 2.0 * period
-        early = np.zeros(len(driven.steps))
+        early = driven.likely_s
         rest, goes = (
-            _series(model, run(driven, early, until=until, at=at), time) for at in (initial, moving)
+            signals_at(model, run(driven, early, until=until, at=at), time) for at in (initial, moving)
         )
         if _off(part, goes) < _off(part, rest):
             initial = moving
             notes.append("the record begins in motion or under load, and so does the model")
     whole = partial(run, at=initial, progress=progress)
-    readings = driving.readings(driven, record)
     tried = [_with_steps(one, time, measured, partial(whole, one)) for one in readings]
     best = min(tried, key=lambda each: _off(measured, each[2]))
     notes.append(f"model: {len(best[1].time_s)} ticks of {period * 1e6:g} us, command {best[0].between}")
@@ -231,39 +233,44 @@ def _with_steps(
     The record says between which samples a step was written, the answer to it at which tick: from a tick
     after the later sample (written before it acts) to the earlier one.
     """
-    tick, (least, most) = driven.design.controller.period_s, ticks_early(driven.design, time)
-    early = np.zeros(len(driven.steps)) if driven.early_s is None else driven.early_s
+    tick, early = driven.design.controller.period_s, driven.likely_s
+    ticks = None if driven.hold is None else 0.0
     made = run(early)
-    series = _series(driven.design, made, time)
+    series = signals_at(driven.design, made, time, ticks)
     name = next((name for name in ANSWERS if name in measured), "")
     for _ in range(STEP_ROUNDS if driven.early_s is None and len(early) and name else 0):
+        least, most = (
+            ticks_early(driven.design, time) if driven.hold is None else driven.hold.more_ticks(early)
+        )
         more = driving.earlier_s(driven, time, measured[name], series[name])
         moved = tick * np.clip(np.round((early + more) / tick), least, most)
+        if driven.hold is not None:
+            moved = early + tick * np.clip(np.round(more / tick), least, most)
         if np.array_equal(moved, early):
             break
         other = run(moved)
-        if _off(measured, nearer := _series(driven.design, other, time)) >= _off(measured, series):
+        if _off(measured, nearer := signals_at(driven.design, other, time, ticks)) >= _off(measured, series):
             break
         early, made, series = moved, other, nearer
+    if driven.hold is not None and not driven.hold.is_whole:
+        ends = driven.hold.more_s(early)
+        if driven.early_s is None:
+            later = likeliest_s(driven.design, made, time, measured, ends)
+            early, series = early + later, signals_at(driven.design, made, time + later, ticks)
+        else:  # what was found may be a little beyond the ends, but no row sees another voltage
+            inside = float(np.clip(0.0, *ends))
+            series = signals_at(driven.design, made, time + inside, -inside)
     return replace(driven, early_s=early), made, series
+
+
+def later_s(design: Design, record: Record) -> tuple[float, float] | None:
+    """Ends of how much later the rows of a hold may be; None where they are at the drive's ticks."""
+    driven = driving.readings(driving.needed_command(design, record), record)[0]
+    if driven.hold is None or driven.hold.is_whole:
+        return None
+    return driven.hold.more_s(driven.likely_s)
 
 
 def ticks_early(design: Design, time_s: Floats) -> tuple[float, float]:
     """By how many ticks a step of the command comes before the row that shows it, at least and at most."""
     return -1.0, float(np.floor(np.median(np.diff(time_s)) / design.controller.period_s * (1.0 + 1e-9)))
-
-
-def _series(design: Design, run: Trajectory, time: Floats) -> dict[str, Floats]:
-    """The signals of a run at some times, under the names of a record."""
-    rate = run.output_speed_rad_s
-    signals = {
-        "angle": run.motor_angle_rad,
-        "output_angle": run.output_angle_rad,
-        "position": run.output_angle_rad,
-        "speed": run.motor_speed_rad_s,
-        "velocity": run.motor_speed_rad_s / design.total_ratio if rate is None else rate,
-        "current": run.current_A,
-        "voltage": run.voltage_V,
-        "force": motor_torque_Nm(design, run.current_A, run.voltage_V),
-    }
-    return {name: np.interp(time, run.time_s, values) for name, values in signals.items()}

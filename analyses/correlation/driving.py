@@ -15,6 +15,7 @@ from actuator_lti.drive.steady import steady_voltage_V
 from actuator_lti.errors import InputError
 from actuator_lti.types import Floats, Ints
 from analyses.estimation.least_squares import scaled_lstsq
+from analyses.records.holds import Hold, hold_of
 from analyses.records.naming import LOADS
 from analyses.records.record import HELD, SMOOTH, STRAIGHT, Record
 from nonlinear import State, commands, loads
@@ -50,19 +51,29 @@ class Driven:
     together: int = 1  # jumps from row to row, between standstills, that are steps each and no curve
     between: str = SMOOTH
     early_s: Floats | None = None  # each step comes before its row, where that is known
+    hold: Hold | None = None  # of a command whose steps are on a grid that the rows tell
 
     @property
     def steps(self) -> Ints:
         """The first row behind each step."""
         return steps_at(self.values, self.together)
 
+    @property
+    def likely_s(self) -> Floats:
+        """By how much each step comes before its row: as known, or where that is looked for from."""
+        if self.early_s is not None:
+            return self.early_s
+        return np.zeros(len(self.steps)) if self.hold is None else self.hold.likely_s
+
 
 def readings(driven: Driven, record: Record) -> list[Driven]:
     """How a command may go on between its samples where the drive's ticks are more; as the record has it.
 
     Jumps in neighbouring rows are a curve or steps; a curve is smooth, or the drive takes it in straight
-    lines or, as from a field bus, held until the next sample.
+    lines or, as from a field bus, held until the next sample. Where the rows tell when it is held, it is.
     """
+    if (told := _held(driven, record)) is not None:
+        return [told]
     found = [driven, replace(driven, together=MOST_TOGETHER)]
     if record.period_s > 1.5 * driven.design.controller.period_s:
         found.append(replace(driven, together=len(record), between=HELD))
@@ -72,6 +83,18 @@ def readings(driven: Driven, record: Record) -> list[Driven]:
         known = [one for one in other if np.array_equal(one.steps, np.flatnonzero(~np.isnan(early)))]
         other = [replace(one, early_s=early[one.steps]) for one in known]
     return [one for one in other if record.between in ("", one.between)] or [driven]
+
+
+def _held(driven: Driven, record: Record) -> Driven | None:
+    """A command that is held, with the tick that the rows tell by its steps; None where they tell none."""
+    held, control = replace(driven, together=len(record), between=HELD), driven.design.controller
+    row_s = float(record.time_s[-1] - record.time_s[0]) / max(len(record) - 1, 1)
+    hold = hold_of(held.steps, len(record), row_s, control.period_s)
+    if hold is None:
+        return None
+    early = None if record.early_s is None else record.early_s[hold.rows]
+    design = replace(driven.design, controller=replace(control, period_s=hold.tick_s))
+    return replace(held, design=design, hold=hold, early_s=early)
 
 
 def command_names(design: Design) -> dict[str, str]:
@@ -182,10 +205,10 @@ def earlier_s(driven: Driven, time_s: Floats, measured: Floats, modelled: Floats
 
     From each step to the next one the answer moves with it, by its rate; a stretch of all the answers (the
     gains, the inertia, the clock) stands beside them, so that it is not taken for a time. Steps in
-    neighbouring rows come as much earlier, by what answers all of them.
+    neighbouring rows, or of one hold, come as much earlier, by what answers all of them.
     """
     rate, off, steps = np.gradient(modelled, time_s), measured - modelled, driven.steps
-    first = np.flatnonzero(np.diff(steps, prepend=-1) > 1)
+    first = np.flatnonzero(np.diff(steps, prepend=-1) > 1) if driven.hold is None else np.zeros(1, np.int64)
     later = steps[first]
     table, rest = np.zeros((len(time_s), len(later) + 1)), np.zeros(len(time_s))
     for k, (start, end) in enumerate(zip(later, [*later[1:], len(time_s)], strict=True)):

@@ -17,7 +17,8 @@ from actuator_lti.design import parameter_value, with_values
 from actuator_lti.design.model import Design
 from actuator_lti.errors import NumericalError
 from actuator_lti.types import Floats
-from analyses.correlation.closed_loop import as_driven, measured_signals, model_signals, ticks_early
+from analyses.correlation.between_ticks import places_s
+from analyses.correlation.closed_loop import as_driven, later_s, measured_signals, model_signals, ticks_early
 from analyses.estimation.fit import Fit
 from analyses.estimation.least_squares import wider_covariance
 from analyses.estimation.parameters import default_value, parameter
@@ -32,6 +33,7 @@ INDUCTANCE = parameter("inductance").key
 BACK, TORQUE = parameter("back_emf").key, parameter("torque_constant").key
 NOT_SHOWN = "the records do not show it (they are as likely with none)"
 NONE = 1e-6  # of the design's inductance: as good as none
+ASIDE = 0.01  # of the time between which the rows may be
 SETTLED = 0.05  # of what a signal leaves, within which its weight may still move
 
 
@@ -188,14 +190,18 @@ def _likeliest(
         runs = [model_signals(tried, *each)[0] for each in zip(parts, measured, strict=True)]
         return weighed(_drives(runs))
 
-    for _ in range(rounds):
+    for turn in range(rounds):
         moved = fit_output(design, keys, made, weighed(wanted), begin=_values(start, keys))
         start = with_values(design, dict(zip(keys, moved.values.tolist(), strict=True)), check=False)
         slopes, rests = (np.split(each, np.cumsum(rows)[:-1]) for each in (moved.slopes, moved.rest))
         left = np.array([np.std(rest) for rest in rests])
         sizes = sizes * left
         unlikely = float(2.0 * rows @ np.log(sizes))
-        if np.all(np.abs(left - 1.0) < SETTLED) or before - unlikely < unlikely - than:
+        told = [(w / size, e / size) for w, e, size in zip(slopes, rests, left, strict=True)]
+        parts, told, moved_s = _at_their_rows(start, parts, sizes, told, anywhere=turn == 0)
+        if (
+            np.all(np.abs(left - 1.0) < SETTLED) and moved_s < SETTLED
+        ) or before - unlikely < unlikely - than:
             break
         before = unlikely
     return _Likeliest(
@@ -203,9 +209,71 @@ def _likeliest(
         keys=keys,
         parts=parts,
         sizes=sizes,
-        told=[(w / size, e / size) for w, e, size in zip(slopes, rests, left, strict=True)],
+        told=told,
         unlikely=unlikely,
     )
+
+
+def _at_their_rows(
+    design: Design,
+    parts: Sequence[Record],
+    sizes: Floats,
+    told: Sequence[tuple[Floats, Floats]],
+    *,
+    anywhere: bool,
+) -> tuple[list[Record], list[tuple[Floats, Floats]], float]:
+    """The records with their rows where they likeliest are between the ticks, and the slopes without that.
+
+    ``told``: slopes over the values and what is left, of unit size. Also the largest of the moves, in its
+    standard errors. ``anywhere``: not only from where they are.
+    """
+    gram = np.sum([w.T @ w for w, _ in told], axis=0)
+    pairs = [slice(k, k + 2) for k in range(0, len(told), 2)]
+    each = [
+        _at_its_rows(design, one, sizes[pair], told[pair], gram, anywhere)
+        for one, pair in zip(parts, pairs, strict=True)
+    ]
+    return (
+        [one for one, *_ in each],
+        [one for _, two, _ in each for one in two],
+        max(move for *_, move in each),
+    )
+
+
+def _at_its_rows(
+    design: Design,
+    part: Record,
+    sizes: Floats,
+    told: Sequence[tuple[Floats, Floats]],
+    gram: Floats,
+    anywhere: bool,
+) -> tuple[Record, Sequence[tuple[Floats, Floats]], float]:
+    """The same of one record; beforehand every time at which its rows show the same jumps is as likely."""
+    if (ends := later_s(design, part)) is None:
+        return part, told, 0.0
+    measured, w = measured_signals(design, part), np.concatenate([slopes for slopes, _ in told])
+
+    def left(more: float) -> Floats:
+        moved = replace(part, early_s=np.asarray(part.early_s) + more)
+        pairs = zip(
+            _drives([measured]), _drives([model_signals(design, moved, measured)[0]]), sizes, strict=True
+        )
+        return np.concatenate([(own - made) / size for own, made, size in pairs])
+
+    def alone(values: Floats) -> Floats:
+        return np.asarray(values - w @ np.linalg.solve(gram, w.T @ values))
+
+    wide, places = ends[1] - ends[0], [0.0, *(places_s(ends) if anywhere else ())]
+    rests = [left(place) for place in places]
+    more = places[int(np.argmin([rest @ alone(rest) for rest in rests]))]
+    column, known = (left(-ASIDE * wide) - left(ASIDE * wide)) / (2.0 * ASIDE * wide), 12.0 / wide**2
+    sure = column @ alone(column) + known
+    if abs(more) <= wide / len(places):
+        more = float(column @ alone(rests[0]) + known * np.mean(ends)) / sure
+        more = float(np.clip(more, ends[0] - 0.5 * wide, ends[1] + 0.5 * wide))
+    w = w - np.outer(column, column @ w / (column @ column + known))
+    own = list(zip(np.split(w, 2), (rest for _, rest in told), strict=True))
+    return replace(part, early_s=np.asarray(part.early_s) + more), own, abs(more) * float(np.sqrt(sure))
 
 
 def _at_its_ticks(design: Design, keys: tuple[str, ...], found: _Likeliest) -> Fit:

@@ -62,7 +62,8 @@ def motor_and_motion(
     ways = [
         [replace(one, between=way) for one in records] for way in sorted(read or [SMOOTH], key=HELD.__eq__)
     ]
-    simulated = settings.electrical and settings.friction != "map" and not _gravity(plain, settings)
+    moves = {own.stage for own, _ in commands if own} <= {"position", "velocity"}
+    simulated = settings.electrical and settings.friction != "map" and not _gravity(plain, settings) and moves
     together = partial(_together, design, plain, settings, recipe)
     tried: list[Found] = []
     for taken in ways:

@@ -1,5 +1,6 @@
 """Commands that are held, of a small motor whose truth is an integration of its own, noise in its loops."""
 
+from dataclasses import replace
 from math import copysign
 
 import numpy as np
@@ -8,9 +9,12 @@ from scipy.linalg import expm
 
 from actuator_lti.design import read_design_text, with_values
 from actuator_lti.design.model import Design
+from analyses.correlation.between_ticks import signals_at
 from analyses.identification.asked import Settings
 from analyses.identification.bench import BenchResult, identify_bench
+from analyses.records.holds import hold_of
 from analyses.records.record import Record
+from nonlinear import commands, simulate
 from tests.identification.bench_records import record_of
 from tests.identification.test_voltage_equation import RATIO, TEXT
 
@@ -33,9 +37,10 @@ def _design() -> Design:
 
 
 def _driven(command: np.ndarray, noise: np.ndarray) -> np.ndarray:
-    """Speed, current, voltage and angle at each tick, as the controller sees them, shape (n, 4).
+    """Speed, current, voltage and angle at each quarter of a tick, shape (4 n, 4).
 
-    Exact over quarters of a tick, but for the one in which the speed changes its sign.
+    At a tick as the controller sees them; the voltage is that of the last one. Exact, but for the tick in
+    which the speed changes its sign.
     """
     table = np.zeros((5, 5))  # current, speed, angle; voltage, friction torque
     table[0, [0, 1, 3]] = np.array([-OHM, -BACK, 1.0]) / HENRY
@@ -43,7 +48,7 @@ def _driven(command: np.ndarray, noise: np.ndarray) -> np.ndarray:
     table[2, 1] = 1.0
     (ii, iw, _, iu, it), (wi, ww, _, wu, wt), (ai, aw, _, au, at) = expm(table * TICK_S / STEPS)[:3].tolist()
     i = w = angle = acting = of_speed = of_current = 0.0
-    rows = np.empty((len(command), 4))
+    rows = np.empty((len(command) * STEPS, 4))
     for k, (wanted, (on_speed, on_current)) in enumerate(zip(command.tolist(), noise.tolist(), strict=True)):
         speed, current = w + on_speed, i + on_current
         off = OF_PLACE * (wanted - angle) - speed
@@ -51,8 +56,8 @@ def _driven(command: np.ndarray, noise: np.ndarray) -> np.ndarray:
         off = OF_SPEED * off + of_speed - current
         of_current += OF_CURRENT * TICK_S / CURRENT_S * off
         voltage = OF_CURRENT * off + of_current
-        rows[k] = speed, current, voltage, angle
         for step in range(STEPS):
+            rows[k * STEPS + step] = w + on_speed, i + on_current, voltage, angle
             u = acting if 2 * step < STEPS else voltage
             friction = copysign(DRY, w or BACK * i) if w or abs(BACK * i) > DRY else BACK * i
             i, w, angle = (
@@ -64,22 +69,28 @@ def _driven(command: np.ndarray, noise: np.ndarray) -> np.ndarray:
     return rows
 
 
-def _record(hold: int, noise: float, seed: int, rows: int = 4000) -> Record:
-    """A row of every tenth tick; noise in the loops, in shares of 600 rad/s and 150 mA."""
-    rng, time = np.random.default_rng(seed), np.arange(rows * EVERY) * TICK_S
+def _record(
+    hold: int, noise: float, seed: int, rows: int = 4000, every: float = EVERY, late: int = 0
+) -> Record:
+    """A row of every tenth tick; noise in the loops, in shares of 600 rad/s and 150 mA.
+
+    ``every``: ticks from row to row, in quarters; ``late``: quarters of a tick before the first.
+    """
+    rng, time = np.random.default_rng(seed), np.arange(int(rows * every) + 1) * TICK_S
     waves = [(4.4, 5.1, 3.5), (8.8, 5.1, 3.5), (40.4, 0.5, 3.5), (48.4, 2.75, 3.5)]
     command = sum(size * (np.sin(rate * time + at) - np.sin(at)) for rate, at, size in waves) / RATIO
     command = (command * np.clip(time / 0.3, 0.0, 1.0))[np.arange(len(time)) // hold * hold]
     on = noise * rng.standard_normal((len(time), 2)) * [600.0, 0.15]
-    speed, current, voltage, angle = _driven(RATIO * command, on)[::EVERY].T
+    at = late + int(every * STEPS) * np.arange(rows)
+    speed, current, voltage, angle = _driven(RATIO * command, on)[at].T
     signals = {
-        "reference": command[::EVERY],
+        "reference": command[at // STEPS],
         "angle": angle,
         "speed": speed,
         "current": current,
         "voltage": voltage,
     }
-    return record_of(time[::EVERY], "held", **signals)
+    return record_of(TICK_S * every * np.arange(rows), "held", **signals)
 
 
 def _identified(record: Record) -> BenchResult:
@@ -105,3 +116,64 @@ def test_noise_in_the_loops_leaves_the_motor_within_its_intervals(noise: float) 
     for fit in (result.electrical, result.model):
         for name in {"resistance", "back_emf", "inertia"} & set(fit.names):
             assert fit.std(name) < 0.04 * TRUTH[name]
+
+
+@pytest.mark.parametrize(
+    ("hold", "every", "late", "clock"), [(13, 10, 0, 1.0), (7, 3.25, 3, 1.0), (7, 3.25, 1, 1.0003)]
+)
+def test_a_hold_of_no_whole_rows_is_told_by_the_rows_that_show_its_jumps(
+    hold: int, every: float, late: int, clock: float
+) -> None:
+    """Rows of 10 ticks under a hold of 13; of 3.25 ticks, between the ticks; and of a tick 0.03 % off."""
+    record = _record(hold, 0.01, 1, every=every, late=late)
+    design = with_values(_design(), {"control.period": TICK_S / clock})
+    result = identify_bench(design, [record], settings=Settings(electrical=True))
+    assert result.passed
+    assert max(map(abs, _off(result).values())) < 3.5
+    for fit in (result.electrical, result.model):
+        for name in {"resistance", "back_emf", "inertia"} & set(fit.names):
+            assert fit.std(name) < 0.02 * TRUTH[name]
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_jumps_tell_when_a_command_is_held(seed: int) -> None:
+    """The grid that made the jumps, of clocks that are locked and are not, of jumps that some holds lack."""
+    rng, tick, rows = np.random.default_rng(seed), 1e-4, 3000
+    ticks, clock = int(rng.integers(3, 60)), 1.0 + (seed % 2) * rng.uniform(-5e-4, 5e-4)
+    period = ticks * tick * clock
+    row = tick * (rng.integers(max(ticks // 4, 1), ticks) + (seed % 4 > 1) * rng.uniform(0.1, 0.9))
+    row = min(row, 0.9 * period)
+    first, count = rng.uniform(0.1, 1.0) * row, int(rows * row / period) - 1
+    numbers = np.flatnonzero(rng.uniform(size=count) < 0.7)
+    jumps = first + numbers * period
+    hold = hold_of(np.ceil(jumps / row - 1e-9).astype(int), rows, row, tick)
+    assert hold is not None
+    assert hold.ticks == ticks
+    assert hold.ticks * hold.tick_s == pytest.approx(period, abs=2.0 * row / np.ptp(numbers))
+    early = np.ceil(jumps / row - 1e-9) * row - jumps
+    for end in (hold.earliest_s, hold.latest_s):
+        assert hold.early_s(end) == pytest.approx(early, abs=row)
+
+
+def test_jumps_at_any_time_are_on_no_grid() -> None:
+    """Of 300 draws at most one is taken for a hold (chance of 1 in 1000 each)."""
+    rng = np.random.default_rng(1)
+    drawn = (np.flatnonzero(rng.uniform(size=2000) < 0.3) + 1 for _ in range(300))
+    assert sum(hold_of(jumps, 2000, 1e-3, 1e-4) is not None for jumps in drawn) <= 1
+
+
+def test_a_run_is_known_between_its_ticks() -> None:
+    """The same voltage in ticks a sixteenth as long: its ticks are between those of the other."""
+    volts, coarse = np.random.default_rng(4).uniform(4.0, 12.0, 200), 16
+    design = with_values(_design(), {"control.computing_delay": 0.5 * TICK_S})
+    bare = replace(design, controller=replace(design.controller, position=None, velocity=None, current=None))
+    fine = with_values(bare, {"control.period": TICK_S / coarse})
+    ticks = np.arange(len(volts)) * TICK_S
+    run = simulate(bare, commands.events(ticks, volts), ticks[-1])
+    other = simulate(fine, commands.events(ticks, volts), ticks[-1])
+    part = slice(coarse, -2 * coarse)
+    seen = signals_at(bare, run, other.time_s[part], 0.0)
+    truth = {"angle": other.motor_angle_rad, "speed": other.motor_speed_rad_s, "current": other.current_A}
+    for name, values in truth.items():
+        assert seen[name] == pytest.approx(values[part], abs=1e-6 * np.ptp(values)), name
+    assert np.array_equal(seen["voltage"], np.repeat(volts[1:], coarse)[: len(seen["voltage"])])
