@@ -185,7 +185,7 @@ def test_a_valve_that_stands_for_seconds_swings_as_often_as_its_record_passes_th
 
 
 def test_breakaways_are_as_many_a_period_as_the_fewest_that_repeat() -> None:
-    """Two a period of 1.5 s, from 0 and 1; four are two periods, one is none, nor are two with one place off."""
+    """Two a period of 1.5 s, from 0 and 1; four are two periods; one is none, nor two with a place off."""
     times, places, ways = np.cumsum([1.0, 0.5] * 4), np.tile([0.0, 1.0], 4), np.tile([1.0, -1.0], 4)
     left = np.stack([times, times, places, places, ways])
     assert [n for n in range(1, 6) if _repeated(left, n, 1.0)] == [2, 4]
@@ -194,7 +194,7 @@ def test_breakaways_are_as_many_a_period_as_the_fewest_that_repeat() -> None:
 
 
 def test_an_irregular_swing_has_no_period_by_chance() -> None:
-    """Breakaways from one count, once 20 s apart and again, with others between them, are no period of 20 s."""
+    """Breakaways from one count 20 s apart, twice, with others between them, are no period of 20 s."""
     values = {"friction.breakaway_ratio": 1.61833, "control.velocity.integral_time": 5.373e-3}
     design = with_values(load_design(HERE / "valve.toml"), values)
     rest = settle(design, 0.0, 0.015708).rest
