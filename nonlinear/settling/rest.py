@@ -252,21 +252,18 @@ class _Watch:
         far = max([self._least, *(1.0 / each for each in counts if each > 0.0)])
         near = np.abs(left[2:4] - left[2:4, -1:]).max(axis=0, initial=0.0) <= far
         like = np.flatnonzero(near & (left[4] == left[4, -1:]))[::-1]
+        moved = np.concatenate(self.seen, axis=1)[1:]
         for turns in range(1, (like.size - 1) // 2 + 1):
             each = like[2 * turns :: -turns]  # the breakaway that this is, a period ago, two
             (before, now), (first, middle, last) = np.diff(left[0, each]), left[1, each].astype(int)
             if each[2] - each[1] != each[1] - each[0] or not _alike(before, now):
                 continue
-            span, seen = self._span(middle, last), left[:, each[0] :]
-            if span > far and _alike(span, self._span(first, middle)):
+            span, seen = _span(moved[:, middle:last]), left[:, each[0] :]
+            if span > far and _alike(span, _span(moved[:, first:middle])):
                 n = next((n for n in range(1, each[2] - each[1] + 1) if _repeated(seen, n, span)), 0)
                 if n:
                     return _Swing(2, (seen.shape[1] - 1) / n / (before + now), alike=True), middle
         return None
-
-    def _span(self, start: int, end: int) -> float:
-        """Of what moves most between two entries."""
-        return float(np.ptp(np.concatenate(self.seen, axis=1)[1:, start:end], axis=1).max())
 
     def _still(self, piece: Piece) -> bool:
         """Whether all signals keep their values; of a speed drive, all but the angles."""
@@ -385,6 +382,11 @@ def _swing_of(times: Floats, values: Floats) -> _Swing:
 def _alike(first: float, second: float) -> bool:
     """Whether two swings, or their times, are as large as each other."""
     return abs(second - first) <= ALIKE * first
+
+
+def _span(moved: Floats) -> float:
+    """Of what moves most."""
+    return float(np.ptp(moved, axis=1).max())
 
 
 def _repeated(left: Floats, n: int, span: float) -> bool:
