@@ -253,6 +253,8 @@ class _Watch:
         near = np.abs(left[2:4] - left[2:4, -1:]).max(axis=0, initial=0.0) <= far
         like = np.flatnonzero(near & (left[4] == left[4, -1:]))[::-1]
         moved = np.concatenate(self.seen, axis=1)[1:]
+        if like.size < 3 or _span(moved[:, int(left[1, like[-1]]) :]) <= far:
+            return None  # no swing that a sensor counts
         for turns in range(1, (like.size - 1) // 2 + 1):
             each = like[2 * turns :: -turns]  # the breakaway that this is, a period ago, two
             (before, now), (first, middle, last) = np.diff(left[0, each]), left[1, each].astype(int)
