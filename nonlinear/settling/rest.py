@@ -251,15 +251,17 @@ class _Watch:
         counts = p[at.COUNTS_PER_RAD] * p[at.RATIO], p[at.POSITION_COUNTS]
         far = max([self._least, *(1.0 / each for each in counts if each > 0.0)])
         near = np.abs(left[2:4] - left[2:4, -1:]).max(axis=0, initial=0.0) <= far
-        times, entries = left[:2, near & (left[4] == left[4, -1:])][:, ::-1]
-        for turns in range(1, (times.size - 1) // 2 + 1):
-            before, now = -np.diff(times[: 2 * turns + 1 : turns])[::-1]
-            if not _alike(before, now):
+        like = np.flatnonzero(near & (left[4] == left[4, -1:]))[::-1]
+        for turns in range(1, (like.size - 1) // 2 + 1):
+            each = like[2 * turns :: -turns]  # the breakaway that this is, a period ago, two
+            (before, now), (first, middle, last) = np.diff(left[0, each]), left[1, each].astype(int)
+            if each[2] - each[1] != each[1] - each[0] or not _alike(before, now):
                 continue
-            first, middle, last = entries[2 * turns :: -turns].astype(int)
-            span = self._span(middle, last)
+            span, seen = self._span(middle, last), left[:, each[0] :]
             if span > far and _alike(span, self._span(first, middle)):
-                return _Swing(2, 2.0 / (before + now), alike=True), middle
+                n = next((n for n in range(1, each[2] - each[1] + 1) if _repeated(seen, n, span)), 0)
+                if n:
+                    return _Swing(2, (seen.shape[1] - 1) / n / (before + now), alike=True), middle
         return None
 
     def _span(self, start: int, end: int) -> float:
@@ -383,3 +385,13 @@ def _swing_of(times: Floats, values: Floats) -> _Swing:
 def _alike(first: float, second: float) -> bool:
     """Whether two swings, or their times, are as large as each other."""
     return abs(second - first) <= ALIKE * first
+
+
+def _repeated(left: Floats, n: int, span: float) -> bool:
+    """Whether breakaways (`_Watch._breakaways`) are those of n before: directions, times, places."""
+    later, earlier = left[:, n:], left[:, :-n]
+    periods = later[0] - earlier[0]
+    places = np.abs(later[2:4] - earlier[2:4]).max()
+    return bool(
+        (later[4] == earlier[4]).all() and np.ptp(periods) <= ALIKE * periods.max() and places <= ALIKE * span
+    )

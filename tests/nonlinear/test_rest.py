@@ -19,7 +19,7 @@ from nonlinear._kernels import layout as at
 from nonlinear.bench.operating_motion import quiet
 from nonlinear.runs.reduced import BatchResult
 from nonlinear.settling.drift import overload, ticks_until_it_acts
-from nonlinear.settling.rest import first_motion_s, judge
+from nonlinear.settling.rest import _repeated, first_motion_s, judge
 from reports.sections.cycles import summary
 from reports.sections.names import fine_unit
 from tests.changed import changed
@@ -182,6 +182,28 @@ def test_a_valve_that_stands_for_seconds_swings_as_often_as_its_record_passes_th
     period_s = (rises[-1] - rises[0]) / (rises.size - 1)
     assert rises.size > 9
     assert rest.frequency_hz == pytest.approx(1.0 / period_s, rel=0.01)
+
+
+def test_breakaways_are_as_many_a_period_as_the_fewest_that_repeat() -> None:
+    """Two a period of 1.5 s, from 0 and 1; four are two periods; one is none, nor two with a place off."""
+    times, places, ways = np.cumsum([1.0, 0.5] * 4), np.tile([0.0, 1.0], 4), np.tile([1.0, -1.0], 4)
+    left = np.stack([times, times, places, places, ways])
+    assert [n for n in range(1, 6) if _repeated(left, n, 1.0)] == [2, 4]
+    left[2, 5] += 0.02
+    assert not _repeated(left, 2, 1.0)
+
+
+def test_an_irregular_swing_has_no_period_by_chance() -> None:
+    """Breakaways from one count 20 s apart, twice, with others between them, are no period of 20 s."""
+    values = {"friction.breakaway_ratio": 1.61833, "control.velocity.integral_time": 5.373e-3}
+    design = with_values(load_design(HERE / "valve.toml"), values)
+    rest = settle(design, 0.0, 0.015708).rest
+    run = simulate(design, commands.step(0.015708), 200.0)
+    late = run.output_angle_rad[run.time_s.size // 4 :]
+    low, high = late.min() + 0.25 * np.ptp(late), late.max() - 0.25 * np.ptp(late)
+    sides = np.flatnonzero((late < low) | (late > high))
+    rises = sides[1:][(late[sides[1:]] > high) & (late[sides[:-1]] < low)] * run.period_s
+    assert np.diff(rises).min() < 1.0 / rest.frequency_hz < np.diff(rises).max()
 
 
 @pytest.mark.parametrize("share", [0.01, 0.05, 0.25, 1.0])
