@@ -30,6 +30,7 @@ from analyses.records.consistency import NO_CHANCE, place_of
 from analyses.records.naming import RATES
 from analyses.records.record import Record, period_of
 
+NO_LOAD = "no load is recorded: the design's value kept"
 SLOW = 0.1  # of the largest speed: the decay down to it is where a search begins
 
 
@@ -154,47 +155,51 @@ def fit_run_downs(
     inertia = "inertia" in held or not known
     free = [name for name in names if name not in held and not (inertia and name == "inertia")]
     picked, left = told_apart(table[:, [names.index(name) for name in free]], free)
-    no_load = Fixed(
-        value=design.friction.load_coefficient, reason="no load is recorded: the design's value kept"
-    )
-    fixed = {"load_coefficient": no_load}
+    found = tuple(free[k] for k in picked)
+    values, covariance, condition = _solved(decays, table, found, own)
+    total = own["inertia"] if inertia else float(values[found.index("inertia")])
+    fixed = {"load_coefficient": Fixed(value=design.friction.load_coefficient, reason=NO_LOAD)}
     fixed |= {name: Fixed(value=value, reason="fixed as asked") for name, value in held.items()}
     for each in left:
-        why, at = f"{each}: the design's value kept", {n: -one for n, one in each.moves.items()}
-        fixed[each.name] = Fixed(value=own[each.name], reason=why, moves=at)
-    found = tuple(free[k] for k in picked)
-    columns = table[:, [names.index(name) for name in found]]
-    target = -sum(own[name] * table[:, k] for k, name in enumerate(names) if name not in found)
-    spread = block_diag(*(np.linalg.cholesky(one.covariance) for one in decays))
-    weighed = np.linalg.solve(spread, np.column_stack([columns, target]))
-    values = scaled_lstsq(weighed[:, :-1], weighed[:, -1])
-    total = own["inertia"] if inertia else float(values[found.index("inertia")])
-    moves = dict(zip(found, (values / total).tolist(), strict=True))
-    said = f"a run-down shows friction over inertia alone, {_said(decays, design.axis)}"
+        moves = {name: -one for name, one in each.moves.items()}
+        fixed[each.name] = Fixed(value=own[each.name], reason=f"{each}: the design's value kept", moves=moves)
     why = "fixed as asked" if known or "inertia" in held else "the design's value kept"
+    why = f"{_said(decays, design.axis)}: {why}, all others grow with it"
     for name in ["inertia"] if inertia else known:
-        at = {n: one * total / own[name] for n, one in moves.items()}
-        fixed[name] = Fixed(value=own[name], reason=f"{said}: {why}, all others grow with it", moves=at)
+        moves = dict(zip(found, (values / own[name]).tolist(), strict=True))
+        fixed[name] = Fixed(value=own[name], reason=why, moves=moves)
     parts = tuple(
         _part(design, *pair, form, found, values, total) for pair in zip(records, decays, strict=True)
     )
     drive, rest = (np.concatenate([getattr(part, name) for part in parts]) for name in ("y", "residual"))
-    covariance = total**2 * np.linalg.inv(weighed[:, :-1].T @ weighed[:, :-1])
     return JointModel(
         names=found,
         values=values,
-        white_errors=np.sqrt(np.diag(covariance)),
-        covariance=covariance,
+        white_errors=total * np.sqrt(np.diag(covariance)),
+        covariance=total**2 * covariance,
         between={},
         fixed=fixed,
         relative_residual=float(np.linalg.norm(rest) / np.linalg.norm(drive)),
         records=parts,
         recipe=parts[0].recipe,
-        condition=float(np.linalg.cond(columns / np.linalg.norm(columns, axis=0))),
+        condition=condition,
         weights=(1.0,) * len(parts),
         form=form,
         bias_told="no derivative is taken of what is recorded: none",
     )
+
+
+def _solved(
+    decays: Sequence[Decay], table: Floats, found: Sequence[str], own: Mapping[str, float]
+) -> tuple[Floats, Floats, float]:
+    """Values of what is found beside ``own`` of the others; covariance for an inertia of 1; condition."""
+    columns = table[:, [k for name in found for k, each in enumerate(own) if each == name]]
+    target = -sum(value * table[:, k] for k, (name, value) in enumerate(own.items()) if name not in found)
+    spread = block_diag(*(np.linalg.cholesky(one.covariance) for one in decays))
+    weighed = np.linalg.solve(spread, np.column_stack([columns, target]))
+    values, weighed = scaled_lstsq(weighed[:, :-1], weighed[:, -1]), weighed[:, :-1]
+    condition = np.linalg.cond(columns / np.linalg.norm(columns, axis=0))
+    return values, np.linalg.inv(weighed.T @ weighed), float(condition)
 
 
 def _balance(decays: Sequence[Decay], form: FrictionForm) -> Floats:
@@ -210,14 +215,14 @@ def _balance(decays: Sequence[Decay], form: FrictionForm) -> Floats:
 
 
 def _said(decays: Sequence[Decay], axis: str) -> str:
-    """The ratios of each record, with their standard errors."""
+    """What run-downs show: the ratios of each record, with their standard errors."""
     unit = "m/s2" if axis == "linear" else "rad/s2"
     errors = [np.sqrt(np.diag(one.covariance)) for one in decays]
     each = [
         f"b/J = {one.ratios[0]:.4g} ± {p:.2g} 1/s and T/J = {one.ratios[1]:.4g} ± {q:.2g} {unit}"
         for one, (p, q) in zip(decays, errors, strict=True)
     ]
-    return "; ".join(each)
+    return f"a run-down shows friction over inertia alone, {'; '.join(each)}"
 
 
 def _part(

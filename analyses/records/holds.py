@@ -87,7 +87,8 @@ def _hold_of(jumps: tuple[int, ...], count: int, row_s: float, tick_s: float) ->
     if len(first) < 3 or first[-1] - first[0] == len(first) - 1:
         return None
     rows = first - first[0]
-    most = int((np.diff(rows).min() + 1) / (tick * (1.0 - RATE_TOLERANCE)))
+    longest = min(np.diff(rows).min() + 1.0, (rows[-1] + 1.0) / (len(rows) - 1))  # no hold has two jumps
+    most = int(longest / (tick * (1.0 - RATE_TOLERANCE)))
     line = np.abs(np.fft.rfft(np.bincount(rows, minlength=FINER * int(rows[-1]))))
     tried = np.log(max(most, 1) * float(rows[-1]) / NO_CHANCE)
     for ticks in range(most, 0, -1):
