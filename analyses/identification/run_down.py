@@ -117,14 +117,19 @@ def decay_of(design: Design, record: Record, *, found: bool = True) -> Decay:
         w = np.where(time < stop, w0 - (p * w0 + q) * held, 0.0)
         return w, w if place is None else x[0] + w0 * held - q * (np.minimum(time, stop) - held) / p
 
-    goes = decay(np.append(begin, about[1:]))[0] > 0.0  # at rest a position errs by one part of a count
+    # at rest a position errs by one part of a count
+    goes = moves | (decay(np.append(begin, about[1:]))[0] > 0.0)
     start = np.append(begin, given) if found else begin
-    solved = least_squares(lambda x: goes * (decay(x)[1] - side * seen), start, method="lm", x_scale="jac")
-    p, q = ratios = np.asarray(solved.x[len(begin) :] if found else given)
-    w = decay(solved.x)[0]
-    covariance = _covariance(solved.jac[goes], solved.fun[goes], len(begin))
     slope = np.array([float(np.mean(speed[moves])), 1.0])  # of the deceleration over both ratios
-    if found and not abs(slope @ ratios) > SURE * np.sqrt(slope @ covariance @ slope):
+    with np.errstate(over="ignore", invalid="ignore"):  # where nothing tells them they grow without bound
+        solved = least_squares(
+            lambda x: goes * (decay(x)[1] - side * seen), start, method="lm", x_scale="jac"
+        )
+        p, q = ratios = np.asarray(solved.x[len(begin) :] if found else given)
+        w = decay(solved.x)[0]
+        covariance = _covariance(solved.jac[goes], solved.fun[goes], len(begin))
+        slows = not found or abs(slope @ ratios) > SURE * np.sqrt(slope @ covariance @ slope)
+    if not slows:
         raise InputError("nothing slows it beyond noise: the record tells no friction", where=record.name)
     return Decay(
         ratios=ratios,
