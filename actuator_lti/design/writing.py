@@ -29,7 +29,8 @@ from actuator_lti.design.units import ampere_unit, si_text
 from actuator_lti.errors import InputError
 from actuator_lti.files.reading import Tree, parse_toml, shown
 
-_WHICH = ("rotor", "to", "locking_gear", "law", "continuous")  # mostly not said
+# Mostly not said, or later than designs that are known by their hash
+_WHICH = ("rotor", "to", "locking_gear", "law", "continuous", "speed_rad_s", "current_A", "ramp_s")
 
 
 def write_design(design: Design) -> str:

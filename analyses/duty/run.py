@@ -173,8 +173,8 @@ def _moving(design: Design, asked: Asked) -> tuple[Trajectory, int]:
     every = round(design.controller.period_of(design.controller.outermost) / Ts)
     lowest = (PERIODS + 1) / (MOST_TICKS * Ts)
     if asked.frequency_hz < lowest:
-        found = f"a motion of {1.0 / asked.frequency_hz:.4g} s ({asked.frequency_hz:.4g} Hz)"
-        raise InputError(f"{found}: at most {1.0 / lowest:.4g} s ({lowest:.4g} Hz) with this period")
+        motion = f"a peak of {size:.4g} (in SI) at {asked.frequency_hz:.4g} Hz"
+        raise InputError(f"{motion}: at least {lowest:.4g} Hz with this period")
     ticks = max(1, round(1.0 / (asked.frequency_hz * Ts * every))) * every
     taken = _periods(design, asked, max(1, MOST_TICKS // ticks - PERIODS))
     command, whole = commands.sine(size, 1.0 / (ticks * Ts)), (PERIODS + taken) * ticks

@@ -345,6 +345,15 @@ def test_an_override_of_an_unknown_key_is_refused(path: str) -> None:
     refused(with_overrides, AMBER, {path: "1 ohm"})
 
 
+@pytest.mark.parametrize(
+    ("stated", "known_as"),
+    [({"duty.amplitude": "5 deg"}, "b1689d6892e2"), ({"failure.stop": "28 deg"}, "acc0a8fc8393")],
+)
+def test_a_key_that_came_later_leaves_the_hash_of_a_design_without_it(stated, known_as: str) -> None:
+    """Hashes that nights, signed reports and folders of studies have."""
+    assert design_hash(with_overrides(AMBER, stated)).startswith(known_as)
+
+
 def test_the_hash_sees_values_and_requirements_and_nothing_else() -> None:
     respelled = with_overrides(AMBER, {"motor.inductance": "0.006 mH", "motor.resistance": "0.055 ohm"})
     assert design_hash(respelled) == design_hash(AMBER)
