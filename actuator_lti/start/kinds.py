@@ -125,7 +125,9 @@ def _is_number(given: Any) -> bool:
 def _is_numbers(given: Any) -> bool:
     import numpy as np
 
-    return np.asarray(given).dtype.kind in "biufc"
+    with suppress(ValueError):  # rows of several lengths
+        return np.asarray(given).dtype.kind in "biufc"
+    return False
 
 
 ANYTHING: Kind = "anything", lambda given: True

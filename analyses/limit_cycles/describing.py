@@ -20,7 +20,7 @@ from dataclasses import dataclass, replace
 from functools import partial, reduce
 from itertools import pairwise
 from math import exp, log, nan, pi
-from typing import Literal
+from typing import Literal, TypeGuard
 
 import numpy as np
 import numpy.typing as npt
@@ -72,6 +72,7 @@ class Mode:
     radius: float
     frequency_hz: float
     shape: dict[str, complex]
+    settled: bool = True  # whether the speeds that it was asked with are its own
 
 
 def cycles_of_play(design: Design, *, friction: bool) -> tuple[Cycle, ...]:
@@ -135,11 +136,11 @@ def kept_up(
     last: Mode | None = None
     for low, value in pairwise([nan, *map(float, grid)]):
         now = mode(value, last)
-        if last is not None and now is not None and _changes(last.radius - 1.0, now.radius - 1.0):
+        if _settled(last) and _settled(now) and _changes(last.radius - 1.0, now.radius - 1.0):
 
             def excess(x: float, near: Mode = last) -> float:
                 found = mode(x, near)
-                return -1.0 if found is None else found.radius - 1.0
+                return found.radius - 1.0 if _settled(found) else -1.0
 
             if _changes(excess(low), excess(value)):
                 root = float(brentq(excess, low, value, xtol=1e-12))
@@ -151,6 +152,10 @@ def kept_up(
         last = now
 
 
+def _settled(mode: Mode | None) -> TypeGuard[Mode]:
+    return mode is not None and mode.settled
+
+
 def _changes(a: float, b: float) -> bool:
     """Whether a sign changes by more than rounding of a mode that nothing moves."""
     return a * b < 0.0 and max(abs(a), abs(b)) > RESOLVED
@@ -160,7 +165,7 @@ def _at_twist(design: Design, A: float, friction: bool, near: Mode | None) -> Mo
     """The least damped oscillation at a twist of amplitude A, the speeds in it being its own.
 
     With friction a fixed point, begun with the shape of an oscillation ``near``, or where that leads to none
-    with speeds at which friction is small. None where it does not settle: friction stops what it began with.
+    with speeds at which friction is small. Where it does not settle, friction stops what it began with.
     """
     speeds = _speeds(near, A)
     for _ in range(_STEPS):
@@ -173,7 +178,7 @@ def _at_twist(design: Design, A: float, friction: bool, near: Mode | None) -> Mo
         if max(abs(log(new / old)) for new, old in zip(now, speeds, strict=True)) < _SETTLED:
             return mode
         speeds = now[0] ** 0.6 * speeds[0] ** 0.4, now[1] ** 0.6 * speeds[1] ** 0.4
-    return None
+    return mode and replace(mode, settled=False)
 
 
 def _speeds(mode: Mode | None, A: float) -> tuple[float, float]:

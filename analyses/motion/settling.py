@@ -20,7 +20,7 @@ from nonlinear.settling.rest import Rest, judge
 
 SMALL = 1e-3  # of full deflection: a step beside those that the design asks for
 NEAR = 0.02  # of the largest value: a run that ends within it has settled
-NOTICED = 1e-6  # of full deflection: a smaller swing is listed, and is rest
+NOTICED = 1e-6  # of the largest command: a smaller swing is listed, and is rest
 
 
 @dataclass(frozen=True)
@@ -49,13 +49,13 @@ class Settling:
         return known.get(self.rest.verdict, self.swing_rad)
 
 
-def counted(rest: Rest, full_deflection_rad: float) -> Rest:
-    """What a motion ended in as it counts: a swing below `NOTICED` of full deflection is rest.
+def counted(rest: Rest, largest: float) -> Rest:
+    """What a motion ended in as it counts: a swing below `NOTICED` of the ``largest`` command is rest.
 
     It keeps its size and frequency. What stands, not known for how long, is no swing.
     """
     swings = rest.verdict in ("limit cycle", "still moving")
-    small = 0.0 < max(rest.amplitude, rest.motor_amplitude) < NOTICED * full_deflection_rad
+    small = 0.0 < max(rest.amplitude, rest.motor_amplitude) < NOTICED * largest
     return replace(rest, verdict="at rest") if swings and small else rest
 
 

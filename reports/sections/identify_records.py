@@ -41,7 +41,7 @@ def section(result: BenchResult) -> doc.Section:
         more = [doc.of(dict(found.bias).get, "bias", "Bias removed", format="sig:2")] if found.bias else []
         blocks.append(identified.parameter_table("Voltage equation", found, note, more=more))
     blocks += [law_table(result, axis)] if result.laws else []
-    blocks += [scatter_table(model, axis)] if len(result.records) > 1 else []
+    blocks += [scatter_table(model, axis)] if model.between else []
     for part, record in zip(model.records, result.records, strict=True):
         blocks += [
             identified.input_table(f"Inputs: {record.name}", result.inputs[record.name]),

@@ -11,6 +11,7 @@ from analyses.identification.asked import Settings
 from analyses.identification.bench import BenchResult, identify_bench
 from analyses.identification.run_down import decay_of, switched_off
 from analyses.records.record import Record
+from reports.sections.identify_records import section
 from tests.identification.bench_records import record_of
 from tests.identification.test_voltage_equation import TEXT
 from tests.refusals import refused
@@ -89,8 +90,10 @@ def test_at_known_friction_the_inertia_is_found() -> None:
 def test_both_directions_tell_the_offset() -> None:
     rng, offset, p = np.random.default_rng(3), 1e-3, VISCOUS / INERTIA
     pair = [_recorded(rng, p, (DRY + side * offset) / INERTIA, side=side) for side in (1, -1)]
-    model = _identified(*pair).model
+    result = _identified(*pair)
+    model = result.model
     assert model.names == ("viscous", "dry", "offset")
+    assert section(result)["blocks"]  # no table of records fitted alone: of a run-down there is none
     for name, truth in (("viscous", VISCOUS), ("dry", DRY), ("offset", offset)):
         assert abs(model[name] - truth) < 3.0 * model.std(name)
 

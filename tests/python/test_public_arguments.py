@@ -42,7 +42,8 @@ override = { "control.position.gain" = "1 V/rad" }
 WRONG = {
     "nothing": None, "a function": lambda one: one, "scipy": signal.lti([1.0], [1.0, 1.0]),
     "text": "3 parsec", "a table": {}, "nan": float("nan"), "inf": float("inf"), "-1": -1,
-    "an empty list": [], "a cube": np.ones((2, 3, 4)), "a design": load_design("emps"), "an object": object(),
+    "an empty list": [], "a ragged list": [[1, 2], [3]],
+    "a cube": np.ones((2, 3, 4)), "a design": load_design("emps"), "an object": object(),
 }  # fmt: skip
 
 
