@@ -109,7 +109,7 @@ class Asked:
         turns = stated.pop("frequency_rad_s", None)
         stated["frequency_hz"] = None if turns is None else turns / (2.0 * pi)
         load = max(design.validation.loads_Nm, key=abs)
-        usual = {"load_Nm": -abs(load) if runs(design) else load}
+        usual = {"load_Nm": 0.0 - abs(load) if runs(design) else load}
         made = given(usual, stated, chosen)
         if not any(name in made for name in SIZES.values()):
             made[SIZES.get(design.controller.outermost, "current_A")] = USUAL_SHARE * full_command(design)

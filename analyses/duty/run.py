@@ -18,6 +18,7 @@ from analyses.duty.asked import Asked
 from analyses.failures.cases import jammed
 from analyses.specification.requirements import RequirementVerdict, judged_by, tally
 from nonlinear import Trajectory, commands, simulate
+from nonlinear.runs.setup import check_frequency
 
 
 @dataclass(frozen=True)
@@ -172,10 +173,12 @@ def _moving(design: Design, asked: Asked) -> tuple[Trajectory, int]:
     every = round(design.controller.period_of(design.controller.outermost) / Ts)
     lowest = (PERIODS + 1) / (MOST_TICKS * Ts)
     if asked.frequency_hz < lowest:
-        raise InputError(f"frequency {asked.frequency_hz:g} Hz: at least {lowest:.2g} Hz with this period")
+        motion = f"a peak of {size:.4g} (in SI) at {asked.frequency_hz:.4g} Hz"
+        raise InputError(f"{motion}: at least {lowest:.4g} Hz with this period")
     ticks = max(1, round(1.0 / (asked.frequency_hz * Ts * every))) * every
-    taken = _periods(design, asked, MOST_TICKS // ticks - PERIODS)
+    taken = _periods(design, asked, max(1, MOST_TICKS // ticks - PERIODS))
     command, whole = commands.sine(size, 1.0 / (ticks * Ts)), (PERIODS + taken) * ticks
+    check_frequency(design, replace(command, highest_hz=max(asked.frequency_hz, command.highest_hz)))
     if asked.ramp_s > 0.0:
         time = np.arange(0, whole, every)
         ends = np.array([0.0, asked.ramp_s / Ts, ticks - asked.ramp_s / Ts, ticks])

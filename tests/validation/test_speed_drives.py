@@ -113,10 +113,22 @@ def test_a_sine_of_speed_and_one_of_current() -> None:
     (TORQUE, {"speed_rad_s": 0.1}, "= 0.1: this drive's command is a current; allowed: current"),
     (SPINDLE, {"speed_rad_s": 0.1, "current_A": 1.0}, "allowed: one of amplitude, speed, current"),
     (SPINDLE, {"ramp_s": 0.6, "frequency_hz": 1.0}, "allowed: 0 to half a period, 0.5 s"),
+    (SPINDLE, {"frequency_hz": 2e4}, "20000 Hz: must be below the Nyquist frequency of the velocity loop"),
+    (SPINDLE, {"speed_rad_s": 1e9}, r"a peak of 1e\+09 .* Hz: at least .* Hz"),
 ])  # fmt: skip
 def test_the_duty_of_another_kind_of_drive_is_refused(design, wrong, words) -> None:
     with pytest.raises(InputError, match=words):
         duty(design, AskedDuty.of(design, **wrong))
+
+
+def test_no_load_has_no_sign_and_the_longest_motion_is_taken(monkeypatch) -> None:
+    swung = changed(SPINDLE, load={"gravity": Gravity(mass_kg=0.1, arm_m=0.1), "path": "back-drivable"})
+    swung = changed(swung, validation={"loads_Nm": (0.0,)})
+    assert str(AskedDuty.of(swung).load_Nm) == "0.0"
+    monkeypatch.setattr("analyses.duty.run.MOST_TICKS", 10_003)  # four periods of 2500.75 ticks
+    lowest = 4.0 / (10_003 * SPINDLE.controller.period_s)
+    asked = AskedDuty.of(swung, speed_rad_s=0.3, ramp_s=0.1, frequency_hz=lowest)
+    assert duty(swung, asked).period_ticks == 2501
 
 
 def test_the_current_of_an_ac_motor_says_which_amperes() -> None:
