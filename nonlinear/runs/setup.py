@@ -218,7 +218,7 @@ def _put_probes(row: Floats, probes: Sequence[Probe], tables: Tables) -> None:
 def put_state(row: Floats, state: State) -> None:
     """Write the initial state."""
     for name, value in vars(state).items():
-        if name != "law" and value is not None:
+        if name in STATE_PLACES or (name != "law" and value is not None):
             finite_number(f"initial.{name}", value)
     for name, (place, _) in STATE_PLACES.items():
         row[place] = getattr(state, name)

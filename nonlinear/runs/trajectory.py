@@ -17,7 +17,6 @@ from actuator_lti.drawing import draw
 from actuator_lti.errors import InputError
 from actuator_lti.files.atomic import write_stream
 from actuator_lti.files.reading import shown
-from actuator_lti.start.border import asked
 from actuator_lti.start.extras import need
 from actuator_lti.types import Compared, Floats
 from nonlinear._kernels import layout as at
@@ -69,7 +68,6 @@ class LimitUse:
         return self.first_time_s is not None
 
 
-@asked
 @dataclass(frozen=True, kw_only=True)
 class State:
     """State of the drive at an instant, motor side; also what a run may start from.
