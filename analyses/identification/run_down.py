@@ -15,7 +15,7 @@ from actuator_lti.types import Floats
 from analyses.estimation.fit import Fixed
 from analyses.estimation.least_squares import scaled_lstsq, told_apart, wider_covariance
 from analyses.estimation.parameters import default_value
-from analyses.identification.asked import Friction
+from analyses.identification.asked import Settings
 from analyses.identification.joint_model import NAMES, FrictionForm, JointModel, RecordFit
 from analyses.identification.rows import (
     drive_of,
@@ -26,7 +26,7 @@ from analyses.identification.rows import (
     record_rows,
     stands,
 )
-from analyses.records.consistency import NO_CHANCE, place_of
+from analyses.records.consistency import NO_CHANCE, SURE, place_of
 from analyses.records.naming import RATES
 from analyses.records.record import Record, period_of
 
@@ -117,12 +117,20 @@ def decay_of(design: Design, record: Record, *, found: bool = True) -> Decay:
         w = np.where(time < stop, w0 - (p * w0 + q) * held, 0.0)
         return w, w if place is None else x[0] + w0 * held - q * (np.minimum(time, stop) - held) / p
 
-    goes = decay(np.append(begin, about[1:]))[0] > 0.0  # at rest a position errs by one part of a count
+    # at rest a position errs by one part of a count
+    goes = moves | (decay(np.append(begin, about[1:]))[0] > 0.0)
     start = np.append(begin, given) if found else begin
-    solved = least_squares(lambda x: goes * (decay(x)[1] - side * seen), start, method="lm", x_scale="jac")
-    p, q = ratios = np.asarray(solved.x[len(begin) :] if found else given)
-    w = decay(solved.x)[0]
-    covariance = wider_covariance([(solved.jac[goes], solved.fun[goes])])[len(begin) :, len(begin) :]
+    slope = np.array([float(np.mean(speed[moves])), 1.0])  # of the deceleration over both ratios
+    with np.errstate(over="ignore", invalid="ignore"):  # where nothing tells them they grow without bound
+        solved = least_squares(
+            lambda x: goes * (decay(x)[1] - side * seen), start, method="lm", x_scale="jac"
+        )
+        p, q = ratios = np.asarray(solved.x[len(begin) :] if found else given)
+        w = decay(solved.x)[0]
+        covariance = _covariance(solved.jac[goes], solved.fun[goes], len(begin))
+        slows = not found or abs(slope @ ratios) > SURE * np.sqrt(slope @ covariance @ slope)
+    if not slows:
+        raise InputError("nothing slows it beyond noise: the record tells no friction", where=record.name)
     return Decay(
         ratios=ratios,
         covariance=covariance,
@@ -136,16 +144,28 @@ def decay_of(design: Design, record: Record, *, found: bool = True) -> Decay:
     )
 
 
+def _covariance(slopes: Floats, rest: Floats, begin: int) -> Floats:
+    """Of the ratios, behind ``begin`` values; of what the record does not tell without bound."""
+    try:
+        covariance = wider_covariance([(slopes, rest)])[begin:, begin:]
+        np.linalg.cholesky(covariance)
+    except np.linalg.LinAlgError:
+        return np.full((2, 2), np.inf)
+    return covariance
+
+
 def fit_run_downs(
-    design: Design, records: Sequence[Record], form: Friction, held: Mapping[str, float]
+    design: Design, records: Sequence[Record], settings: Settings, held: Mapping[str, float]
 ) -> JointModel:
     """Friction of records that nothing drives, at the design's inertia; or that, at friction ``held``.
 
     They show friction over inertia, and no torque: what is kept says so, and the ratios.
 
-    Raises `InputError`: for a friction map.
+    Raises `InputError`: for a friction map or a pendulum, or where nothing slows a record.
     """
-    if form == "map":
+    if settings.gravity:
+        raise InputError("--gravity: a run-down shows no torque, and no pendulum", where=records[0].name)
+    if (form := settings.friction) == "map":
         told = "--friction map: of a run-down are allowed symmetric and per-direction"
         raise InputError(told, where=records[0].name)
     decays, names = [decay_of(design, record) for record in records], NAMES[form]
