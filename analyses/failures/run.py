@@ -117,8 +117,9 @@ def failures(design: AnyDesign, asked: Asked | None = None) -> Failures:
     before = {start: _before(design, asked.load_Nm, start) for start in sorted({c.start for c in cases})}
     settled = {start: Rig(design, asked.load_Nm) for start in before}
     for start, rig in settled.items():
-        stays = before[start].rest.comes_to_rest and not (runs(design) and follows_angle(design))
-        _hold(rig, start, wait, MOST_TICKS if stays else wait)
+        rest = before[start].rest
+        stays = rest.comes_to_rest and not (runs(design) and follows_angle(design))
+        _hold(rig, start, wait, MOST_TICKS if stays else wait, 2.0 * rest.amplitude)
     made = dict[str, FailureCase]()
     for case in cases:
         rig = settled[case.start].copy()
@@ -145,14 +146,14 @@ def _worse(first: FailureCase, second: FailureCase) -> FailureCase:
     return replace(taken, **{name: max(getattr(first, name), getattr(second, name)) for name in peaks})
 
 
-def _hold(rig: Rig, start: float, wait: int, most: int) -> None:
-    """Hold a start until what the command orders stays, over ``wait`` ticks, within `SETTLED` of its size."""
+def _hold(rig: Rig, start: float, wait: int, most: int, swing: float) -> None:
+    """Hold a start until what it orders spans over ``wait`` ticks `SETTLED` of its size beside its swing."""
     for _ in range(0, most, wait):
         seen = list[float]()
         for _ in range(wait):
             rig.step(start)
             seen.append(rig.followed)
-        if np.ptp(seen) <= SETTLED * abs(seen[-1]):
+        if np.ptp(seen) <= SETTLED * abs(seen[-1]) + swing:
             return
 
 

@@ -268,8 +268,10 @@ def _fitted(
     both: Fit | None = None,
 ) -> JointModel:
     """The joint model as the settings ask, less its own bias, or with what was found with the motor."""
-    if all(runs_down(start, record) for record in records):
-        return fit_run_downs(start, records, settings.friction, held)
+    if down := [record for record in records if runs_down(start, record)]:
+        if len(down) < len(records):
+            raise InputError("nothing drives it: a run-down is identified by itself", where=down[0].name)
+        return fit_run_downs(start, records, settings, held)
     weights = None if both is None else np.ones(len(records))
     model = _raw(start, settings, held, recipe, records, weights)
     parts = []

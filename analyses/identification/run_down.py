@@ -15,9 +15,11 @@ from actuator_lti.types import Floats
 from analyses.estimation.fit import Fixed
 from analyses.estimation.least_squares import scaled_lstsq, told_apart, wider_covariance
 from analyses.estimation.parameters import default_value
-from analyses.identification.asked import Friction
+from analyses.identification.asked import Settings
 from analyses.identification.joint_model import NAMES, FrictionForm, JointModel, RecordFit
 from analyses.identification.rows import (
+    REST_SHARE,
+    REST_TIME_S,
     drive_of,
     is_loaded,
     is_white,
@@ -26,9 +28,9 @@ from analyses.identification.rows import (
     record_rows,
     stands,
 )
-from analyses.records.consistency import NO_CHANCE, place_of
+from analyses.records.consistency import NO_CHANCE, SURE, place_of
 from analyses.records.naming import RATES
-from analyses.records.record import Record, period_of
+from analyses.records.record import Record, lasting, period_of
 
 NO_LOAD = "no load is recorded: the design's value kept"
 SLOW = 0.1  # of the largest speed: the decay down to it is where a search begins
@@ -100,6 +102,9 @@ def decay_of(design: Design, record: Record, *, found: bool = True) -> Decay:
         side * speed,
         [] if place is None else [side * seen[0]],
     )
+    if _moves_again(speed, period):
+        told = "it moves again after it stood: a run-down is one decay, each a file of its own"
+        raise InputError(told, where=record.name)
     moves = speed > SLOW * np.max(speed)
     table = np.column_stack([np.ones_like(time), -period * np.cumsum(speed), -time])
     about = scaled_lstsq(table[moves], speed[moves])
@@ -117,12 +122,20 @@ def decay_of(design: Design, record: Record, *, found: bool = True) -> Decay:
         w = np.where(time < stop, w0 - (p * w0 + q) * held, 0.0)
         return w, w if place is None else x[0] + w0 * held - q * (np.minimum(time, stop) - held) / p
 
-    goes = decay(np.append(begin, about[1:]))[0] > 0.0  # at rest a position errs by one part of a count
+    # at rest a position errs by one part of a count
+    goes = moves | (decay(np.append(begin, about[1:]))[0] > 0.0)
     start = np.append(begin, given) if found else begin
-    solved = least_squares(lambda x: goes * (decay(x)[1] - side * seen), start, method="lm", x_scale="jac")
-    p, q = ratios = np.asarray(solved.x[len(begin) :] if found else given)
-    w = decay(solved.x)[0]
-    covariance = wider_covariance([(solved.jac[goes], solved.fun[goes])])[len(begin) :, len(begin) :]
+    slope = np.array([float(np.mean(speed[moves])), 1.0])  # of the deceleration over both ratios
+    with np.errstate(over="ignore", invalid="ignore"):  # where nothing tells them they grow without bound
+        solved = least_squares(
+            lambda x: goes * (decay(x)[1] - side * seen), start, method="lm", x_scale="jac"
+        )
+        p, q = ratios = np.asarray(solved.x[len(begin) :] if found else given)
+        w = decay(solved.x)[0]
+        covariance = _covariance(solved.jac[goes], solved.fun[goes], len(begin))
+        slows = not found or abs(slope @ ratios) > SURE * np.sqrt(slope @ covariance @ slope)
+    if not slows:
+        raise InputError("nothing slows it beyond noise: the record tells no friction", where=record.name)
     return Decay(
         ratios=ratios,
         covariance=covariance,
@@ -136,16 +149,36 @@ def decay_of(design: Design, record: Record, *, found: bool = True) -> Decay:
     )
 
 
+def _moves_again(speed: Floats, period_s: float) -> bool:
+    """Whether what moves, for 30 ms or more at a tenth of the largest speed, stood or turned back before."""
+    most = float(np.max(np.abs(speed)))
+    far = lasting(np.abs(speed) > SLOW * most, max(round(REST_TIME_S / period_s), 6))
+    since, until = (np.logical_or.accumulate(far[::step])[::step] for step in (1, -1))
+    return bool(np.any(speed[since & until] < REST_SHARE * most))
+
+
+def _covariance(slopes: Floats, rest: Floats, begin: int) -> Floats:
+    """Of the ratios, behind ``begin`` values; of what the record does not tell without bound."""
+    try:
+        covariance = wider_covariance([(slopes, rest)])[begin:, begin:]
+        np.linalg.cholesky(covariance)
+    except np.linalg.LinAlgError:
+        return np.full((2, 2), np.inf)
+    return covariance
+
+
 def fit_run_downs(
-    design: Design, records: Sequence[Record], form: Friction, held: Mapping[str, float]
+    design: Design, records: Sequence[Record], settings: Settings, held: Mapping[str, float]
 ) -> JointModel:
     """Friction of records that nothing drives, at the design's inertia; or that, at friction ``held``.
 
     They show friction over inertia, and no torque: what is kept says so, and the ratios.
 
-    Raises `InputError`: for a friction map.
+    Raises `InputError`: for a friction map, a pendulum, or a record that nothing slows, or that moves again.
     """
-    if form == "map":
+    if settings.gravity:
+        raise InputError("--gravity: a run-down shows no torque, and no pendulum", where=records[0].name)
+    if (form := settings.friction) == "map":
         told = "--friction map: of a run-down are allowed symmetric and per-direction"
         raise InputError(told, where=records[0].name)
     decays, names = [decay_of(design, record) for record in records], NAMES[form]

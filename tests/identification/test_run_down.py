@@ -124,9 +124,40 @@ def test_a_decay_of_another_law_is_not_proven(more: float) -> None:
     assert law.passed is (None if more else True)
 
 
-def test_a_current_that_drives_is_not_taken_for_noise() -> None:
+@pytest.mark.parametrize("by", ["speed", "angle"])
+def test_a_motor_that_nothing_slows_tells_no_friction(by: str) -> None:
+    """It ended in an error of linear algebra, or in ratios of any size."""
+    for seed in range(5):
+        rng, time = np.random.default_rng(seed), PERIOD_S * np.arange(2000)
+        begin = rng.uniform(300.0, 400.0)
+        seen = begin + 0.05 * rng.standard_normal(len(time))
+        seen = COUNT * np.floor(begin * time / COUNT) if by == "angle" else seen
+        record = record_of(time, current=0.0 * time, **{by: seen})
+        refused(decay_of, _design(), record, words="no friction")
+
+
+@pytest.mark.parametrize(("side", "rest"), [(-1, 1), (1, 1), (-1, 0)])
+def test_two_decays_in_one_record_are_refused(side: int, rest: int) -> None:
+    """The first alone was fitted, and all rows told as used."""
+    speed = _decay(VISCOUS / INERTIA, DRY / INERTIA, 300.0)[1]
+    speed = speed if rest else speed[speed > 0.0]
+    both = np.concatenate([speed, side * speed])
+    record = record_of(PERIOD_S * np.arange(len(both)), speed=both, current=0.0 * both)
+    refused(identify_bench, _design(), [record], settings=Settings(), words="one decay")
+
+
+def test_a_run_down_beside_a_driven_record_or_with_gravity_is_refused() -> None:
+    down = _recorded(np.random.default_rng(8), VISCOUS / INERTIA, DRY / INERTIA)
+    refused(identify_bench, _design(), [down, _driven()], settings=Settings(), words="by itself")
+    refused(identify_bench, _design(), [down], settings=Settings(gravity=True), words="--gravity")
+
+
+def _driven() -> Record:
     """Noise of 0.1 A that turns the rotor by itself, from rest."""
     drive = 0.3 * np.random.default_rng(5).standard_normal(4000)
     speed = np.concatenate([[0.0], np.cumsum(PERIOD_S * 0.05 * drive[:-1] / INERTIA)])
-    record = record_of(PERIOD_S * np.arange(4000), "driven", speed=speed, current=drive)
-    assert np.any(switched_off(_design(), record)["current"])
+    return record_of(PERIOD_S * np.arange(4000), "driven", speed=speed, current=drive)
+
+
+def test_a_current_that_drives_is_not_taken_for_noise() -> None:
+    assert np.any(switched_off(_design(), _driven())["current"])

@@ -9,7 +9,7 @@ from scipy.linalg import expm
 from scipy.optimize import brentq
 
 from actuator_lti import InputError, assemble_loops
-from actuator_lti.design import load_design, with_overrides
+from actuator_lti.design import load_design, read_design_text, with_overrides
 from actuator_lti.design.model import Load, PositionLoop
 from analyses.failures import Asked, failures
 from analyses.failures.cases import Rig, _sines, cases_of
@@ -235,9 +235,51 @@ def test_a_self_locking_drive_is_where_it_holds_before_a_failure() -> None:
     asked, rig = Asked.of(slow), Rig(slow, 0.0)
     wait = _settling_s(slow, asked)
     assert wait > 3.45
-    _hold(rig, half := 0.5 * asked.stop_rad, round(wait / slow.controller.period_s), MOST_TICKS)
+    _hold(rig, half := 0.5 * asked.stop_rad, round(wait / slow.controller.period_s), MOST_TICKS, 0.0)
     assert rig.output_rad == pytest.approx(half, rel=1e-3)
     assert rig.measured().motor_speed_rad_s == pytest.approx(0.0, abs=1e-3)
+
+
+SLOT_CAR = """
+[design]
+name = "slot-car"
+[motor]
+constants = "dc"
+resistance = "1.3 ohm"
+inductance = "0.35 mH"
+torque_constant = "3.5 mN*m/A"
+rotor_inertia = "1.1 g*cm^2"
+[[gear]]
+name = "crown"
+ratio = 3
+[load]
+inertia = "100 g*cm^2"
+path = "back-drivable"
+moment_max = "10 mN*m"
+[friction]
+dry_torque = "0.5 mN*m"
+[encoder]
+counts_per_rev = 48
+speed = "difference"
+difference_samples = 4
+[limits]
+voltage = "7.4 V"
+[control]
+period = "1 ms"
+computing_delay = "0.2 ms"
+velocity = {gain = "10 mV*s/rad", integral_time = "60 ms"}
+"""
+
+
+def test_a_drive_that_its_counts_swing_for_ever_is_not_waited_for(monkeypatch) -> None:
+    """By +-0.98 thousandths of its speed: rest, and never within a thousandth from end to end."""
+    design, step, gone = read_design_text(SLOT_CAR), Rig.step, list[float]()
+    monkeypatch.setattr(Rig, "step", lambda rig, command: gone.append(command) or step(rig, command))
+    result = failures(design, Asked.of(design, watched_s=0.01, detection_s=0.01))
+    (before,) = result.before
+    assert before.rest.comes_to_rest
+    assert 0.5e-3 < before.rest.amplitude / before.amplitude_rad < 1e-3
+    assert len(gone) < 20_000
 
 
 def test_the_headline_names_what_reaches_the_stop_first() -> None:
