@@ -1,6 +1,7 @@
 """The public border: an argument of another kind than its annotation says is refused in one line.
 
-Inside the house functions are imported from their own modules, and look at nothing.
+The border is the package: a name taken from it looks at its arguments inside the house too; a function taken
+from the module that defines it looks at nothing, unless that module is public itself (`nonlinear.commands`).
 """
 
 import sys
