@@ -18,6 +18,8 @@ from analyses.estimation.parameters import default_value
 from analyses.identification.asked import Settings
 from analyses.identification.joint_model import NAMES, FrictionForm, JointModel, RecordFit
 from analyses.identification.rows import (
+    REST_SHARE,
+    REST_TIME_S,
     drive_of,
     is_loaded,
     is_white,
@@ -28,7 +30,7 @@ from analyses.identification.rows import (
 )
 from analyses.records.consistency import NO_CHANCE, SURE, place_of
 from analyses.records.naming import RATES
-from analyses.records.record import Record, period_of
+from analyses.records.record import Record, lasting, period_of
 
 NO_LOAD = "no load is recorded: the design's value kept"
 SLOW = 0.1  # of the largest speed: the decay down to it is where a search begins
@@ -100,6 +102,9 @@ def decay_of(design: Design, record: Record, *, found: bool = True) -> Decay:
         side * speed,
         [] if place is None else [side * seen[0]],
     )
+    if _moves_again(speed, period):
+        told = "it moves again after it stood: a run-down is one decay, each a file of its own"
+        raise InputError(told, where=record.name)
     moves = speed > SLOW * np.max(speed)
     table = np.column_stack([np.ones_like(time), -period * np.cumsum(speed), -time])
     about = scaled_lstsq(table[moves], speed[moves])
@@ -144,6 +149,14 @@ def decay_of(design: Design, record: Record, *, found: bool = True) -> Decay:
     )
 
 
+def _moves_again(speed: Floats, period_s: float) -> bool:
+    """Whether what moves, for 30 ms or more at a tenth of the largest speed, stood or turned back before."""
+    most = float(np.max(np.abs(speed)))
+    far = lasting(np.abs(speed) > SLOW * most, max(round(REST_TIME_S / period_s), 6))
+    since, until = (np.logical_or.accumulate(far[::step])[::step] for step in (1, -1))
+    return bool(np.any(speed[since & until] < REST_SHARE * most))
+
+
 def _covariance(slopes: Floats, rest: Floats, begin: int) -> Floats:
     """Of the ratios, behind ``begin`` values; of what the record does not tell without bound."""
     try:
@@ -161,7 +174,7 @@ def fit_run_downs(
 
     They show friction over inertia, and no torque: what is kept says so, and the ratios.
 
-    Raises `InputError`: for a friction map or a pendulum, or where nothing slows a record.
+    Raises `InputError`: for a friction map, a pendulum, or a record that nothing slows, or that moves again.
     """
     if settings.gravity:
         raise InputError("--gravity: a run-down shows no torque, and no pendulum", where=records[0].name)

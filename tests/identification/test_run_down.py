@@ -136,6 +136,16 @@ def test_a_motor_that_nothing_slows_tells_no_friction(by: str) -> None:
         refused(decay_of, _design(), record, words="no friction")
 
 
+@pytest.mark.parametrize(("side", "rest"), [(-1, 1), (1, 1), (-1, 0)])
+def test_two_decays_in_one_record_are_refused(side: int, rest: int) -> None:
+    """The first alone was fitted, and all rows told as used."""
+    speed = _decay(VISCOUS / INERTIA, DRY / INERTIA, 300.0)[1]
+    speed = speed if rest else speed[speed > 0.0]
+    both = np.concatenate([speed, side * speed])
+    record = record_of(PERIOD_S * np.arange(len(both)), speed=both, current=0.0 * both)
+    refused(identify_bench, _design(), [record], settings=Settings(), words="one decay")
+
+
 def test_a_run_down_beside_a_driven_record_or_with_gravity_is_refused() -> None:
     down = _recorded(np.random.default_rng(8), VISCOUS / INERTIA, DRY / INERTIA)
     refused(identify_bench, _design(), [down, _driven()], settings=Settings(), words="by itself")
