@@ -2,10 +2,12 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import fields
-from typing import Any, ClassVar
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
+
+from actuator_lti.start.border import CHECKED
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
@@ -13,6 +15,7 @@ Real = NDArray[np.floating[Any]]
 Complex = NDArray[np.complexfloating[Any, Any]]
 Mask = NDArray[np.bool_]
 Ints = NDArray[np.int64]
+Delay = Annotated[float, CHECKED]
 Progress = Callable[[int, int], None] | None
 """Called with (done, total) while long work goes on; None: nobody looks on."""
 

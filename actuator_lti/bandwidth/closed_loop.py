@@ -29,6 +29,7 @@ from actuator_lti.systems.delay_response import DelayResponse, plain_behind_dela
 from actuator_lti.systems.exact_response import dc_noise, shown
 from actuator_lti.systems.plain_system import PlainSystem
 from actuator_lti.systems.rest_mode import without_rest_mode
+from actuator_lti.types import Delay
 
 _FLOOR = 1e-6  # of the gain at zero frequency: the phase is followed down to it
 _TAKEN = flint.fmpq(1, 1000)
@@ -38,7 +39,7 @@ _POLE = "the response has a pole at zero frequency: it is no closed loop with a 
 _NO_GAIN = "DC gain is 0: no -3 dB bandwidth (the response is zero at zero frequency)"
 
 
-def closed_loop_bandwidth(system: Any, delay_s: float = 0.0, level: Level = "1/sqrt(2)") -> Bandwidth:
+def closed_loop_bandwidth(system: Any, delay_s: Delay = 0.0, level: Level = "1/sqrt(2)") -> Bandwidth:
     """Bandwidths of a closed-loop response (give T itself, not the open loop).
 
     One input, one output; continuous, sampled or a `DelaySystem`. Of measured data each figure comes with
@@ -125,7 +126,7 @@ def _bandwidth(
     )
 
 
-def peaks(system: Any, delay_s: float = 0.0) -> Peaks:
+def peaks(system: Any, delay_s: Delay = 0.0) -> Peaks:
     """Peaks of S and T of the open loop L, one input, one output, under negative unit feedback.
 
     ``delay_s``: exact delay in series with L.

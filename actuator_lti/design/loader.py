@@ -83,7 +83,7 @@ def _shipped(name: str) -> Design:
     return read_design_text(design_text(name), name)
 
 
-def read_design_text(text: str, origin: str = "design", folder: Path = Path()) -> Design:
+def read_design_text(text: str, origin: str = "design", folder: Path | str = "") -> Design:
     """Read a design from TOML text; ``origin`` is named in errors and kept in the design.
 
     Files that it names, as a law's, are sought in ``folder``.
@@ -91,7 +91,7 @@ def read_design_text(text: str, origin: str = "design", folder: Path = Path()) -
     Raises `InputError`: as :func:`load_design`.
     """
     if tree := parse_toml(text, origin):
-        return design_from_tree(tree, origin, Findings(origin, lines_of(text, tree), folder))
+        return design_from_tree(tree, origin, Findings(origin, lines_of(text, tree), Path(folder)))
     raise InputError("is empty; allowed: a design file (actuator-lti init writes one)", where=origin)
 
 

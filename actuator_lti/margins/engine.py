@@ -1,7 +1,8 @@
 """`stability_margins`: one entry for every kind of loop."""
 
 from dataclasses import replace
-from typing import Any
+from math import nan
+from typing import Annotated, Any
 
 from actuator_lti.errors import InputError, NumericalError, delay_number, shown
 from actuator_lti.margins.assemble import assembled
@@ -14,12 +15,15 @@ from actuator_lti.margins.results import StabilityMargins
 from actuator_lti.margins.single import Agreement
 from actuator_lti.margins.trust import Doubtful
 from actuator_lti.measured.response import is_measured
+from actuator_lti.start.border import CHECKED
+from actuator_lti.types import Delay, number_array
 
+Band = Annotated[tuple[float, float], CHECKED]
 MOST_STATES = 200  # of a loop for exact arithmetic: 7 s there, 3 s of 140, minutes of 320
 
 
 def stability_margins(
-    system: Any, delay_s: float = 0.0, band_rad_s: tuple[float, float] | None = None, *, certify: bool = False
+    system: Any, delay_s: Delay = 0.0, band_rad_s: Band | None = None, *, certify: bool = False
 ) -> StabilityMargins:
     """Find all margins of a loop L closed by negative unit feedback.
 
@@ -86,7 +90,10 @@ def stability_margins(
 def _band(band: Any) -> tuple[float, float] | None:
     if band is None:
         return None
-    low, high = map(float, band)
+    try:
+        low, high = map(float, number_array(list(band)))
+    except (TypeError, ValueError, OverflowError):
+        low = high = nan
     if not 0.0 <= low < high:
         raise InputError(f"band_rad_s = {shown(band)}: two frequencies, 0 <= low < high, in rad/s")
     return low, high

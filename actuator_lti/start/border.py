@@ -1,6 +1,7 @@
 """The public border: an argument of another kind than its annotation says is refused in one line.
 
-Inside the house functions are imported from their own modules, and look at nothing.
+The border is the package: a name taken from it looks at its arguments inside the house too; a function taken
+from the module that defines it looks at nothing, unless that module is public itself (`nonlinear.commands`).
 """
 
 import sys
@@ -10,6 +11,7 @@ from itertools import chain
 from types import FunctionType
 from typing import Any, TypeVar
 
+CHECKED = "by the function that takes it, which says what is allowed"  # in an `Annotated`
 Made = TypeVar("Made", bound=type)
 _GUARDED = set[Callable[..., Any]]()
 

@@ -13,9 +13,10 @@ from inspect import getsource, signature
 from numbers import Integral
 from os import PathLike
 from types import NoneType, SimpleNamespace, UnionType
-from typing import Any, Literal, Union, get_args, get_origin, get_type_hints, is_typeddict
+from typing import Annotated, Any, Literal, Union, get_args, get_origin, get_type_hints, is_typeddict
 
 from actuator_lti.errors import InputError, shown
+from actuator_lti.start.border import CHECKED
 
 Kind = tuple[str, Callable[[Any], bool]]  # words for what is allowed, and whether it is that
 
@@ -46,13 +47,20 @@ class _Names(dict[str, Any]):
 def _kinds(made: Callable[..., Any]) -> dict[str, Kind]:
     """What each argument may be."""
     asked = {name: hint for name, hint in made.__annotations__.items() if name != "return"}
-    hints = get_type_hints(SimpleNamespace(__annotations__=asked), localns=_Names(made.__globals__))
+    hints = get_type_hints(
+        SimpleNamespace(__annotations__=asked), localns=_Names(made.__globals__), include_extras=True
+    )
     return {name: _kind(hint) for name, hint in hints.items()}
 
 
 def _kind(hint: Any) -> Kind:
-    """What a hint allows; of what has a name or path as well anything: who opens that tells of it."""
+    """What a hint allows; anything where others tell more of it.
+
+    Who opens it does of what has a name or path as well, its own check of what is `CHECKED`.
+    """
     origin, inside = get_origin(hint) or hint, get_args(hint)
+    if origin is Annotated:
+        return ANYTHING if inside[1] is CHECKED else _kind(inside[0])
     if origin is Literal:
         words = f"one of {', '.join(map(str, inside))}"
         return words, lambda given: isinstance(given, Hashable) and given in inside
@@ -102,7 +110,7 @@ def _instance(kind: Any) -> Kind:
     if is_typeddict(kind) or issubclass(kind, Mapping):
         return "a dict", lambda given: isinstance(given, Mapping)
     of = PathLike if issubclass(kind, PathLike) else kind
-    return f"a {kind.__name__} ({kind.__module__})", lambda given: isinstance(given, of)
+    return f"a {kind.__name__}, from {kind.__module__}", lambda given: isinstance(given, of)
 
 
 def _takes(given: Any, count: int) -> bool:

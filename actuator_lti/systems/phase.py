@@ -18,13 +18,13 @@ from actuator_lti.margins.trust import Doubtful
 from actuator_lti.measured.bounds import bounds
 from actuator_lti.measured.response import is_measured, measured_response
 from actuator_lti.systems.delay_response import DelayResponse, plain_behind_delay
-from actuator_lti.types import Real, number_array
+from actuator_lti.types import Delay, Real, number_array
 
 _AT_REST = 1e-10  # of the median: a root this near to zero is one at zero, beside which the side is rounding
 _ON_AXIS = 1e-30  # relative: what certified roots leave of an undamped one
 
 
-def unwrapped_phase_deg(system: Any, omega_rad_s: ArrayLike, delay_s: float = 0.0) -> Real:
+def unwrapped_phase_deg(system: Any, omega_rad_s: ArrayLike, delay_s: Delay = 0.0) -> Real:
     """Phase of a system over frequency, in deg, without jumps of 360 deg whatever the grid.
 
     The phase of a rational system is the sum of the phases of its poles and zeros, that of a delay is

@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from actuator_lti.bounds import RUN_TICKS
+from actuator_lti.design.loader import AnyDesign, as_design
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError, finite_number, positive_number, shown
 from actuator_lti.start.border import asked
@@ -91,7 +92,7 @@ class Reducers:
 class Run:
     """One run of a batch; the names are those of `nonlinear.simulate`."""
 
-    design: Design
+    design: AnyDesign
     command: Command
     duration_s: float
     load_Nm: float | LoadMoment = 0.0
@@ -104,7 +105,7 @@ class Run:
 
     def row(self, tables: Tables) -> Floats:
         """The parameter row of this run; time series go into ``tables``."""
-        design = self.design
+        design = as_design(self.design)
         row = _design_row(design, self.friction_on, self.limits_on).copy()
         row[at.TICKS] = ticks_of(self.duration_s, design.controller.period_s)
         for place, signal in ((at.COMMAND, self.command), (at.BIAS, self.bias)):

@@ -71,10 +71,8 @@ def test_undamped_poles_on_the_axis_are_passed_on_the_right(loop: control.Transf
     assert (m.stable is True) == bool((values.real < -1e-9).all())
 
 
-BAND = (
-    r"^band_rad_s = .*: (two frequencies, 0 <= low < high, in rad/s|must be 2, each a number, in SI or None)$"
-)
-NO_BANDS = ((1,), 5, ("a", "b"), "ab", (2, 1), (1, 2, 3), (None, 1), (math.nan, 1))
+BAND = r"^band_rad_s = .*: two frequencies, 0 <= low < high, in rad/s$"
+NO_BANDS = ((1,), 5, ("a", "b"), "ab", "12", (2, 1), (1, 2, 3), (None, 1), (math.nan, 1))
 
 
 @pytest.mark.parametrize(("loop", "asked", "message"), [

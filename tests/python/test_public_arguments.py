@@ -16,7 +16,14 @@ from scipy import signal
 
 import analyses
 import nonlinear
-from actuator_lti import assemble_loops, load_design, onset, write_design
+from actuator_lti import (
+    assemble_loops,
+    load_design,
+    onset,
+    read_design_text,
+    stability_margins,
+    write_design,
+)
 from actuator_lti.batch import Population, linear_figures
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError, NumericalError
@@ -294,3 +301,11 @@ def answered(name: str, arguments: dict[str, Any]) -> bool:
     finally:
         pyplot.close("all")
     return True
+
+
+def test_names_texts_and_series_are_taken_where_they_answer() -> None:
+    assert stability_margins(LAG, 0.0, iter((0.1, 10.0))) == stability_margins(LAG, 0.0, (0.1, 10.0))
+    assert read_design_text(write_design(SMALL), "x", "/") == read_design_text(write_design(SMALL), "x")
+    runs = [Run(design=design, command=STEP, duration_s=0.01) for design in (AMBER, "ilr33-amber")]
+    by_design, by_name = nonlinear.simulate_many(runs).rows
+    assert np.array_equal(by_design, by_name, equal_nan=True)
