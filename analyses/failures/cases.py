@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import partial
 
+from actuator_lti.design.control import Stage
 from actuator_lti.design.model import Command, Design, Instruments, LoadFriction
 from actuator_lti.drive.facts import held_moment_Nm, resonance_rad_s, stall_torque_Nm
 from actuator_lti.drive.operating import runs, straight
@@ -78,6 +79,13 @@ class Rig:
         other = {"velocity": speed, "current": true.current_A, "voltage": true.voltage_V}
         return other.get(stage, self.output_rad)
 
+    @property
+    def turning(self) -> dict[str, str]:
+        """Speed of the output side and energy of the motor side, in words."""
+        speed, design = self.measured().motor_speed_rad_s, self.design
+        energy = 0.5 * design.motor_side_inertia_kgm2 * speed**2
+        return {"speed": _size(design, speed / design.total_ratio, "velocity"), "energy": f"{energy:.3g} J"}
+
     def fail(self, broken: Design) -> None:
         """Go on with another plant from the same angles, speeds, current and voltage."""
         state = self.measured()
@@ -123,7 +131,7 @@ class Case:
     """One failure."""
 
     name: str
-    words: str
+    words: str  # with {speed} and {energy} as in `Rig.turning`
     command: Course  # command over the time from the failure on (from the step on, where ``at_rad`` is given)
     broken: Callable[[Rig], None] = lambda _: None  # what is done to the rig
     start: float = 0.0  # command that the drive follows before
@@ -177,14 +185,12 @@ def _of_position(design: Design, asked: Asked) -> tuple[Case, ...]:
 
 def _of_speed(design: Design, asked: Asked) -> tuple[Case, ...]:
     W, far = asked.speed_rad_s, full_command(design)
-    over, turns = (
-        f"the command jumps to ±{_size(design, far)}",
-        f"while the drive turns at {_size(design, W)}",
-    )
-    energy = 0.5 * design.motor_side_inertia_kgm2 * (W * design.total_ratio) ** 2
-    jams = f"the output jams {turns}, {energy:.3g} J in what turns before the coupling"
+    over = f"the command jumps to ±{_size(design, far)}"
+    turns, jams = "while the drive turns at {speed}" if W else "at rest", "the output jams "
+    energy = ", {energy} in what turns before the coupling"
     if design.coupling is None:
-        jams = f"the output jams {turns}; the {energy:.3g} J that turn are no part of this torque"
+        energy = "; the {energy} that turn are no part of this torque"
+    jams += turns + energy * bool(W)
     return (
         Case("hard-over-command", over, lambda _: far, start=W),
         Case("hard-over-command", over, lambda _: -far, start=W),
@@ -282,6 +288,6 @@ def _sines(design: Design, size: float) -> Iterator[tuple[float, str]]:
         yield passed, "the highest that rate and acceleration of the command let pass"
 
 
-def _size(design: Design, value: float) -> str:
-    unit, scale = COMMAND_UNITS[design.axis, design.controller.outermost]
-    return f"{scale * value:.3g} {unit}"
+def _size(design: Design, value: float, stage: Stage | None = None) -> str:
+    unit, scale = COMMAND_UNITS[design.axis, stage or design.controller.outermost]
+    return f"{float(f'{scale * value:.3g}'):g} {unit}"

@@ -179,6 +179,7 @@ def _settling_s(design: Design, asked: Asked) -> float:
 def _followed(rig: Rig, asked: Asked, case: Case) -> FailureCase:
     """What comes of a failure."""
     Ts, start = rig.design.controller.period_s, rig.output_rad
+    words = case.words.format(**rig.turning)
     case.broken(rig)
     rows = []
     for k in range(ceil(asked.watched_s / Ts) + 1):
@@ -193,7 +194,7 @@ def _followed(rig: Rig, asked: Asked, case: Case) -> FailureCase:
     protected = t[overloaded > 0.0]
     return FailureCase(
         name=case.name,
-        words=case.words,
+        words=words,
         time_s=t,
         deflection_rad=moved,
         speed_rad_s=speed,

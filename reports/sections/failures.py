@@ -7,7 +7,7 @@ import numpy as np
 
 from actuator_lti.asked.verdict import Verdict
 from analyses.failures.run import Failures
-from analyses.motion.settling import noticed, told, verdict_of
+from analyses.motion.settling import acting, noticed, told, verdict_of
 from reports import document as doc
 from reports.charts import style
 from reports.numbers import seconds, short
@@ -31,7 +31,7 @@ def section(result: Failures) -> doc.Section:
     swing, load = noticed(result.design, result.before), f"{asked.load_Nm:g} {result.design.load_unit}"
     held = "has come to rest"
     if asked.speed_rad_s:
-        held = f"turns at a command of {out.per('s').of(asked.speed_rad_s)}"
+        held = f"turns at a command of {out.per('s').of(asked.speed_rad_s)}{acting(result.before[0].rest)}"
     if swing is not None:
         held = f"{_unsteady(result)}, {told(result.design, swing, *command_unit(result.design))},"
     intro = (

@@ -142,6 +142,17 @@ def test_the_current_of_an_ac_motor_says_which_amperes() -> None:
         read_design_text(text + '\n[duty]\ncurrent = "5 A"\n')
 
 
+def test_what_jams_turns_as_fast_as_it_does_and_not_as_it_is_told() -> None:
+    """J w^2/2 at the limit of the speed; at rest nothing turns."""
+    w = 0.5 * RUNAWAY
+    slow, short = changed(SPINDLE, limits={"speed_rad_s": w}), {"watched_s": 0.01, "detection_s": 0.01}
+    made = failures(slow, Asked.of(slow, speed_rad_s=1e6, **short))
+    assert f"the {0.5 * J * w**2:.3g} J that turn" in made.case("jam").words
+    assert "speed limit acting" in failures_section(made)["intro"]
+    still = failures(slow, Asked.of(slow, speed_rad_s=0.0, **short))
+    assert still.case("jam").words == "the output jams at rest"
+
+
 def test_an_open_phase_lets_a_spindle_coast() -> None:
     """w(t) = (W + C0/b) exp(-b t/J) - C0/b until it stands; the angle run on is its integral."""
     result = failed(SPINDLE)
