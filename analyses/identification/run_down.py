@@ -39,7 +39,8 @@ SLOW = 0.1  # of the largest speed: the decay down to it is where a search begin
 def runs_down(design: Design, record: Record) -> bool:
     """Whether nothing that is known drives a record: no current, force or voltage, and no load."""
     acts = design.load.acting() or design.coupling is not None or design.motor.over_angle.bends
-    return not (acts or is_loaded(record) or np.any(drive_of(design, record)[0]))
+    drive, *_, braked = drive_of(design, record)  # by its own voltage, where it is shorted
+    return not (acts or braked or is_loaded(record) or np.any(drive))
 
 
 def switched_off(design: Design, record: Record) -> Record:

@@ -168,6 +168,18 @@ def test_a_run_down_beside_a_driven_record_or_with_gravity_is_refused() -> None:
     refused(identify_bench, _design(), [down], settings=Settings(gravity=True), words="--gravity")
 
 
+def test_a_shorted_motor_brakes_itself_and_is_no_run_down() -> None:
+    """No voltage at its clamps: a current kM w / R, which tells the inertia, ten times the design's."""
+    design, inertia = _design(viscous=VISCOUS, dry_torque=DRY), 10.0 * INERTIA
+    motor = design.motor
+    assert motor.torque_constant_Nm_A is not None
+    assert motor.resistance_ohm is not None
+    braking = motor.torque_constant_Nm_A**2 / motor.resistance_ohm
+    time, speed, _ = _decay((VISCOUS + braking) / inertia, DRY / inertia, 550.0)
+    record = record_of(time, "short", speed=speed, voltage=0.0 * time)
+    assert identify_bench(design, [record]).model["inertia"] == pytest.approx(inertia, rel=0.03)
+
+
 def _driven() -> Record:
     """Noise of 0.1 A that turns the rotor by itself, from rest."""
     drive = 0.3 * np.random.default_rng(5).standard_normal(4000)
