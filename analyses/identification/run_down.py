@@ -191,6 +191,7 @@ def fit_run_downs(
     found = tuple(free[k] for k in picked)
     values, covariance, condition = _solved(decays, table, found, own)
     total = own["inertia"] if inertia else float(values[found.index("inertia")])
+    values = _possible(found, values, total**2 * covariance)
     fixed = {"load_coefficient": Fixed(value=design.friction.load_coefficient, reason=NO_LOAD)}
     fixed |= {name: Fixed(value=value, reason="fixed as asked") for name, value in held.items()}
     for each in left:
@@ -233,6 +234,15 @@ def _solved(
     values, weighed = scaled_lstsq(weighed[:, :-1], weighed[:, -1]), weighed[:, :-1]
     condition = np.linalg.cond(columns / np.linalg.norm(columns, axis=0))
     return values, np.linalg.inv(weighed.T @ weighed), float(condition)
+
+
+def _possible(names: Sequence[str], values: Floats, covariance: Floats) -> Floats:
+    """The values; friction below zero within its error is none, and the others as expected beside that."""
+    least = -2.0 * np.sqrt(np.diag(covariance))
+    none = [k for k, name in enumerate(names) if name != "offset" and least[k] <= values[k] < 0.0]
+    moved = values - covariance[:, none] @ scaled_lstsq(covariance[np.ix_(none, none)], values[none])
+    moved[none] = 0.0
+    return moved
 
 
 def _balance(decays: Sequence[Decay], form: FrictionForm) -> Floats:

@@ -136,6 +136,22 @@ def test_a_motor_that_nothing_slows_tells_no_friction(by: str) -> None:
         refused(decay_of, _design(), record, words="no friction")
 
 
+def test_no_dry_friction_is_written_as_none() -> None:
+    """Below zero within its error the design's own was kept, 8 mN m, which does not meet the record."""
+    none, time = 0, PERIOD_S * np.arange(4000)
+    fall = 300.0 * np.exp(-VISCOUS / INERTIA * time)
+    for seed in range(4):
+        seen = fall + 0.05 * np.random.default_rng(seed).standard_normal(4000)
+        result = _identified(record_of(time, speed=seen, current=0.0 * time))
+        dry, law = result.model["dry"], result.design.friction
+        assert abs(dry) < 4.0 * result.model.std("dry") < 1e-3 * DRY
+        assert law.dry_torque_Nm == pytest.approx(dry, rel=1e-6)
+        assert law.viscous_Nms_rad == pytest.approx(VISCOUS, rel=1e-3)
+        assert all(item.passed for item in result.items if item.id.startswith("written-"))
+        none += dry == 0.0
+    assert none
+
+
 @pytest.mark.parametrize(("side", "rest"), [(-1, 1), (1, 1), (-1, 0)])
 def test_two_decays_in_one_record_are_refused(side: int, rest: int) -> None:
     """The first alone was fitted, and all rows told as used."""
