@@ -85,17 +85,18 @@ class Asked:
             period = f"{1.0 / self.frequency_hz:g} s"
             raise InputError(f"share = {self.share:g} of {self.cycle_s:g} s: must hold a period, {period}")
 
-    def size_of(self, design: Design) -> float:
-        """Peak of the command; an InputError where it is of another kind of drive."""
+    def size_of(self, design: Design, place: str = "") -> float:
+        """Peak of the command; an InputError where it is of another kind of drive, by the key at a place."""
         stage = design.controller.outermost
         size: float | None = getattr(self, SIZES.get(stage, ""), None)
         if size is None:
             name, value = next(
                 (name, one) for name in SIZES.values() if (one := getattr(self, name)) is not None
             )
+            wrong = place + key_of(name) if place else name
             raise InputError(
-                f"{name} = {value:.6g}: this drive's command is a {stage}; "
-                f"allowed: {key_of(SIZES.get(stage, 'none'))}"
+                f"{wrong} = {value:.6g}: this drive's command is a {stage}; "
+                f"allowed: {place}{key_of(SIZES.get(stage, 'none'))}"
             )
         return size
 
@@ -113,7 +114,10 @@ class Asked:
         made = given(usual, stated, chosen)
         if not any(name in made for name in SIZES.values()):
             made[SIZES.get(design.controller.outermost, "current_A")] = USUAL_SHARE * full_command(design)
-        return cls(**(_run_up(design, made) if "speed_rad_s" in made else made))
+        asked = cls(**(_run_up(design, made) if "speed_rad_s" in made else made))
+        if {*SIZES.values()} & {*given(stated)} - {*given(chosen)}:
+            asked.size_of(design, "duty.")
+        return asked
 
 
 def _run_up(design: Design, made: dict[str, float]) -> dict[str, float]:
