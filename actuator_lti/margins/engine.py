@@ -15,8 +15,7 @@ from actuator_lti.margins.results import StabilityMargins
 from actuator_lti.margins.single import Agreement
 from actuator_lti.margins.trust import Doubtful
 from actuator_lti.measured.response import is_measured
-from actuator_lti.start.border import CHECKED
-from actuator_lti.types import Delay, number_array
+from actuator_lti.types import CHECKED, Delay, number_array
 
 Band = Annotated[tuple[float, float], CHECKED]
 MOST_STATES = 200  # of a loop for exact arithmetic: 7 s there, 3 s of 140, minutes of 320

@@ -11,7 +11,6 @@ from itertools import chain
 from types import FunctionType
 from typing import Any, TypeVar
 
-CHECKED = "by the function that takes it, which says what is allowed"  # in an `Annotated`
 Made = TypeVar("Made", bound=type)
 _GUARDED = set[Callable[..., Any]]()
 

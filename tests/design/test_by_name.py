@@ -177,7 +177,7 @@ def test_a_bad_argument_is_an_input_error_that_says_what_is_allowed(name: str) -
     (lambda: onset(assemble_loops(DESIGN), float("nan")), "omega_rad_s = nan"),
     (lambda: onset(assemble_loops(DESIGN), 1.0, 3), "bias = 3: must be a dict or None"),
     (lambda: onset(assemble_loops(DESIGN), 1.0, {"curent": 1.0}), "curent"),
-    (lambda: onset("ilr33-amber", 1.0), "must be a Loops (actuator_lti"),
+    (lambda: onset("ilr33-amber", 1.0), "must be a Loops, from actuator_lti"),
     (lambda: Probe(point="u", gain="x"), "gain = 'x': must be a number"),
     (lambda: simulate(DESIGN, commands.step(0.01), 0.01, progress=5), "progress = 5"),
     (lambda: simulate(DESIGN, commands.step(0.01), 0.01, tanh_tolerance=0), "tanh_tolerance = 0"),
