@@ -11,6 +11,8 @@ from typing import Any
 
 LONGEST = 1000  # characters of a refusal; what stands in a file may be longer
 
+CHECKED = "by the function that takes it, which says what is allowed"  # in an `Annotated`
+
 
 class InputError(ValueError):
     """Bad input: one line that names the place, the key, the value and what is allowed.

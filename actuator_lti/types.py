@@ -7,13 +7,14 @@ from typing import Annotated, Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from actuator_lti.errors import CHECKED
+
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
 Real = NDArray[np.floating[Any]]
 Complex = NDArray[np.complexfloating[Any, Any]]
 Mask = NDArray[np.bool_]
 Ints = NDArray[np.int64]
-CHECKED = "by the function that takes it, which says what is allowed"  # in an `Annotated`
 Delay = Annotated[float, CHECKED]
 Progress = Callable[[int, int], None] | None
 """Called with (done, total) while long work goes on; None: nobody looks on."""

@@ -15,8 +15,7 @@ from os import PathLike
 from types import NoneType, SimpleNamespace, UnionType
 from typing import Annotated, Any, Literal, Union, get_args, get_origin, get_type_hints, is_typeddict
 
-from actuator_lti.errors import InputError, shown
-from actuator_lti.types import CHECKED
+from actuator_lti.errors import CHECKED, InputError, shown
 
 Kind = tuple[str, Callable[[Any], bool]]  # words for what is allowed, and whether it is that
 
