@@ -112,7 +112,7 @@ def amplitude_map(
     """
     design = as_design(design)
     finite_number("load_Nm", load_Nm)
-    given = [whole_number("counts", each, 2) for each in counts]
+    given = tuple(whole_number("counts", each, 2) for each in counts)
     part = min(np.sqrt(MOST_TICKS / (given[0] * work_ticks(design, loops, given[1]))), 1.0)
     counts = max(int(part * given[0]), 2), max(int(part * given[1]), 2)
     frequencies = tones(design, loops, counts[1])
