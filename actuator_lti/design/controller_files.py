@@ -50,10 +50,8 @@ _COMMENT = re.compile(r"//[^\n]*|/\*.*?(?:\*/|\Z)", re.S)
 _ASSIGNED = re.compile(r"(?:^|(?<=;))[ \t]*(\w+)\.([\w.]+)\s*=\s*([^;\n]+);", re.M)
 _BUILT = re.compile(r"\bBLDCMotor\s+(\w+)\s*(?:=\s*BLDCMotor\s*)?\(([^)]*)\)")
 _ARGUMENTS = ("pole_pairs", "phase_resistance", "KV_rating", "phase_inductance")
-
-
 _NO_FILTER = {"control.velocity.filter": None}  # no more than the measured speed's own
-_NO_FRICTION = {"control.position.friction_feedforward": None, "control.position.derivative_filter": None}
+_PLAIN_POSITION = {"control.position.friction_feedforward": None, "control.position.derivative_filter": None}
 
 
 class Setting:
@@ -180,7 +178,7 @@ FORMATS = (
         {"control.period": "125 us", "control.velocity.every": 1, "control.position.every": 1,
          "encoder.speed": "tracking", "encoder.bandwidth": "1000 rad/s",
          "encoder.filter_time": None, "control.position.integral_time": None,
-         "control.position.derivative_time": None, **_NO_FRICTION, **_NO_FILTER},
+         "control.position.derivative_time": None, **_PLAIN_POSITION, **_NO_FILTER},
         _motor_type, {_TYPE: (None, "")},
         newer={"axis0.config.motor.": _MOTOR, "current_soft_max": "current_lim",
                "axis0.config.encoder_bandwidth": _AXIS + "bandwidth",
@@ -247,7 +245,7 @@ FORMATS = (
                   "voltage_power_supply", "driver.voltage_limit"),
             Setting("limits.speed", "rad/s", 1.0, "velocity_limit"),
         ),
-        {**_NO_FRICTION, **_NO_FILTER}, _torque_mode,
+        {**_PLAIN_POSITION, **_NO_FILTER}, _torque_mode,
         {"torque_controller": (None, ""), "pole_pairs": (None, ""),
          "phase_resistance": ("-current", "by voltage the gain is taken times it, as by the library up to "
          "2.3; from 2.4 on that is right by estimated_current only"),

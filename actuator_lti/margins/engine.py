@@ -4,7 +4,7 @@ from dataclasses import replace
 from math import nan
 from typing import Annotated, Any
 
-from actuator_lti.errors import InputError, NumericalError, delay_number, shown
+from actuator_lti.errors import CHECKED, InputError, NumericalError, delay_number, shown
 from actuator_lti.margins.assemble import assembled
 from actuator_lti.margins.checked import checked_margins
 from actuator_lti.margins.delays.form import DelayForm, delay_form, without_series_delays
@@ -15,7 +15,7 @@ from actuator_lti.margins.results import StabilityMargins
 from actuator_lti.margins.single import Agreement
 from actuator_lti.margins.trust import Doubtful
 from actuator_lti.measured.response import is_measured
-from actuator_lti.types import CHECKED, Delay, number_array
+from actuator_lti.types import Delay, number_array
 
 Band = Annotated[tuple[float, float], CHECKED]
 MOST_STATES = 200  # of a loop for exact arithmetic: 7 s there, 3 s of 140, minutes of 320

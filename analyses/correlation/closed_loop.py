@@ -239,13 +239,11 @@ def _with_steps(
     series = signals_at(driven.design, made, time, ticks)
     name = next((name for name in ANSWERS if name in measured), "")
     for _ in range(STEP_ROUNDS if driven.early_s is None and len(early) and name else 0):
-        least, most = (
-            ticks_early(driven.design, time) if driven.hold is None else driven.hold.more_ticks(early)
-        )
         more = driving.earlier_s(driven, time, measured[name], series[name])
-        moved = tick * np.clip(np.round((early + more) / tick), least, most)
-        if driven.hold is not None:
-            moved = early + tick * np.clip(np.round(more / tick), least, most)
+        if driven.hold is None:
+            moved = tick * np.clip(np.round((early + more) / tick), *ticks_early(driven.design, time))
+        else:
+            moved = early + tick * np.clip(np.round(more / tick), *driven.hold.more_ticks(early))
         if np.array_equal(moved, early):
             break
         other = run(moved)

@@ -16,7 +16,7 @@ from actuator_lti.loops.stiffness import compliance
 from actuator_lti.types import Floats
 from analyses.failures.asked import Asked
 from analyses.failures.cases import Case, Rig, cases_of
-from analyses.motion.settling import NOTICED, Settling, counted, outcome, settle
+from analyses.motion.settling import Settling, counted, outcome, settle
 from analyses.specification.capability import drive_figures
 from analyses.specification.requirements import RequirementVerdict, judged_by, tally
 
@@ -136,7 +136,7 @@ def _before(design: Design, load_Nm: float, start: float) -> Settling:
     if not runs(design):
         return outcome(design, load_Nm, start)
     one = settle(straight(design), load_Nm, start)
-    return replace(one, rest=counted(one.rest, SETTLED / NOTICED * start))
+    return replace(one, rest=counted(one.rest, SETTLED * start))
 
 
 def _worse(first: FailureCase, second: FailureCase) -> FailureCase:

@@ -145,9 +145,7 @@ def kept_up(
             if _changes(excess(low), excess(value)):
                 root = float(brentq(excess, low, value, xtol=1e-12))
                 there = mode(root, last)
-                if (
-                    there is not None and abs(there.radius - 1.0) < _JUMP
-                ):  # else others become the least damped
+                if _settled(there) and abs(there.radius - 1.0) < _JUMP:
                     yield root, there, last.radius > 1.0
         last = now
 

@@ -49,13 +49,13 @@ class Settling:
         return known.get(self.rest.verdict, self.swing_rad)
 
 
-def counted(rest: Rest, largest: float) -> Rest:
-    """What a motion ended in as it counts: a swing below `NOTICED` of the ``largest`` command is rest.
+def counted(rest: Rest, least: float) -> Rest:
+    """What a motion ended in as it counts: a swing below the ``least`` is rest.
 
     It keeps its size and frequency. What stands, not known for how long, is no swing.
     """
     swings = rest.verdict in ("limit cycle", "still moving")
-    small = 0.0 < max(rest.amplitude, rest.motor_amplitude) < NOTICED * largest
+    small = 0.0 < max(rest.amplitude, rest.motor_amplitude) < least
     return replace(rest, verdict="at rest") if swings and small else rest
 
 
@@ -82,7 +82,7 @@ def step_rows(design: Design, load_Nm: float, step_rad: float, *, limits_on: boo
 def outcome(design: Design, load_Nm: float, step_rad: float) -> Settling:
     """What a step ends in as it counts: `settle`, and swings that are too small are rest."""
     one = settle(design, load_Nm, step_rad)
-    return replace(one, rest=counted(one.rest, full_command(design)))
+    return replace(one, rest=counted(one.rest, NOTICED * full_command(design)))
 
 
 def settlings_of(
@@ -270,7 +270,7 @@ def conduct(run: Trajectory, full_deflection_rad: float = 0.0) -> Conduct:
         return Conduct("following", _limited(run))
     unit, factor = COMMAND_UNITS[run.axis, "velocity" if run.stage == "voltage" else run.stage]
     if run.stage == "position":
-        rest = counted(rest, full_deflection_rad)
+        rest = counted(rest, NOTICED * full_deflection_rad)
     shorter = run.time_s[-1] * (rest.frequency_hz or inf) < 1.0  # the run than a period
     if not rest.comes_to_rest:
         text = words(rest, factor, unit).removeprefix("limit cycle of ").removeprefix("still moving ")
