@@ -79,21 +79,14 @@ def step_figures(system: Any) -> StepFigures:
     if hasattr(system, "delays_s"):
         if (plain := plain_behind_delay(system)) is None:
             return _figures(*delayed_response(system))
-        system, late = plain
-        return _later(step_figures(system), late) if late else step_figures(system)
+        own, late = step_figures(plain[0]), plain[1]
+        return own if not late else replace(
+            own, settling_time_s=own.settling_time_s + late, peak_time_s=own.peak_time_s + late,
+            time_s=np.concatenate(([0.0, late], own.time_s + late)),
+            response=np.concatenate(([0.0, 0.0], own.response)),
+        )  # fmt: skip
     loop = rational_loop(system)
     return _figures(*rational_motion(system, loop), period_s=loop.period_s, notes=_notes(loop))
-
-
-def _later(figures: StepFigures, delay_s: float) -> StepFigures:
-    """Behind a delay in series."""
-    return replace(
-        figures,
-        settling_time_s=figures.settling_time_s + delay_s,
-        peak_time_s=figures.peak_time_s + delay_s,
-        time_s=np.concatenate(([0.0, delay_s], figures.time_s + delay_s)),
-        response=np.concatenate(([0.0, 0.0], figures.response)),
-    )
 
 
 def _figures(
