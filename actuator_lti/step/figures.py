@@ -56,10 +56,9 @@ class StepFigures(Compared):
 def step_figures(system: Any) -> StepFigures:
     """Figures of the unit step response of a stable system.
 
-    A rational system is taken exactly as its doubles say, as the free motion of its certified poles; all of
-    time is halved, so that nothing hides between two points of a grid. A sampled system is looked at at its
-    samples. A system with inner delays is walked along its first delays, and is then the free motion of its
-    exact poles. All figures are relative to the final value, however small it is beside what comes before.
+    A rational system is taken exactly as its doubles say, as the free motion of its certified poles, at all
+    times or at its samples; one with inner delays is walked along its first delays, and is then the free
+    motion of its exact poles. All figures are relative to the final value, however small that is.
 
     ``system``: a closed loop, one input, one output: StateSpace, TransferFunction (of
     scipy.signal too) or DelaySystem.
