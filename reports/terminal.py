@@ -156,7 +156,7 @@ def _list(text: Text, said: Iterable[tuple[Mapping[str, Any], Any]]) -> None:
     there = [(column, cell) for column, cell in cells if cell.plain.strip() not in ("", "–")]
     for number, (column, cell) in enumerate(there):
         label = column["label"] if column["label"] != "Unit" else ""
-        between = " " if column["label"] == "Unit" else ", " if label in ("", "at") else "; "
+        between = " " if column["label"] == "Unit" else ", " if label in GOES_ON else "; "
         text.append(between if number else "")
         text.append(f"{label} ".lstrip()).append_text(cell).append(f" {column['unit']}".rstrip())
 
