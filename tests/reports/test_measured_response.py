@@ -171,10 +171,9 @@ def test_a_sampling_period_in_a_file_is_read_as_one_of_data(name: str, tmp_path:
                 told = measured_over(LOOPS, file, "velocity").read_as
                 assert (f'sampling period in s "{name}"' in told, "not read" in told) == (True, False)
                 continue
-            for call, of in ((measured_over, LOOPS), (identify_response, design)):
-                refused(
-                    call, of, file, loop="velocity", words=f"dt = {dt:g} s; allowed: {period:g} s, of the vel"
-                )
+            words = f"dt = {dt:g} s; allowed: {period:g} s, of the vel"
+            refused(measured_over, LOOPS, file, "velocity", words=words)
+            refused(identify_response, design, file, loop="velocity", words=words)
 
 
 def test_the_other_sign_is_named() -> None:
