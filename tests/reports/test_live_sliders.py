@@ -27,11 +27,6 @@ DROP = """([name, text]) => {
 }"""
 
 
-@pytest.fixture
-def page(opens) -> Page:
-    return opens(AMBER)
-
-
 def refusal(design: Design) -> str:
     """What the command line refuses first, values as they are then."""
     try:

@@ -32,13 +32,6 @@ PAGE_UP = """find('[data-chart="bode"] .plots').dispatchEvent(
     new KeyboardEvent("keydown", { key: "PageUp", bubbles: true }));"""
 
 
-@pytest.fixture
-def page(opens) -> Page:
-    result = opens(AMBER)
-    result.done()
-    return result
-
-
 def at_once(page: Page, does: str) -> object:
     """Do several things in one script, before the page has a frame of its own."""
     return page.evaluate(f"async () => {{ {HANDS} {does} }}")
