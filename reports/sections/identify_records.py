@@ -190,11 +190,8 @@ def scatter_table(model: JointModel, axis: str) -> doc.Block:
 def residual_blocks(model: JointModel, tests: Sequence[ResidualTest], axis: str) -> list[doc.Block]:
     """The tests of all records, and three pictures of each; those of further records on demand."""
     first, *others = (_figures(part, tests, axis) for part in model.records)
-    folded = (
-        [doc.details("Residuals of the other records", [one for each in others for one in each])]
-        if others
-        else []
-    )
+    more = [figure for each in others for figure in each]
+    folded = [doc.details("Residuals of the other records", more)] if more else []
     return [_residual_table(tests), *first, *folded]
 
 
