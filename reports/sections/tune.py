@@ -131,7 +131,8 @@ def _curve(result: TuningResult) -> doc.Block:
         (False, "x", style.RED, "another requirement fails"),
     ):
         if chosen := [(p.bandwidth_hz, p.phase_margin_deg) for p in result.trade_off if p.feasible is ok]:
-            panel.points(*zip(*chosen, strict=True), legend, marker=marker, colour=colour, size=7.0)
+            xs, ys = zip(*chosen, strict=True)
+            panel.points(xs, ys, legend, marker=marker, colour=colour, size=7.0)
     required: style.Style = {"colour": style.RED, "width": 1.2, "dash": 1, "seen": True, "label": "required"}
     if width and width[0] is not None:
         panel.rule_x(width[0], **required)
