@@ -209,6 +209,7 @@ NO_ROW = {  # without arguments; the same as `load_design`; calls a compiler
     "actuator_lti.design.as_design", "nonlinear.export.fmu_bytes",
 }  # fmt: skip
 SAME_KIND = {(Design, "a design"), (tuple, "an empty list")}
+TOLD = "allowed|must|one of|needed|two frequencies"
 KINDS = {"nothing", "a function", "scipy", "a table", "a design", "an object"}  # no numbers or texts
 SHAPED = {"omega_rad_s", "injection", "disturbance_Nm"}  # numbers of any shape
 
