@@ -140,7 +140,9 @@ def survey_loops(design: AnyDesign, progress: Progress = None) -> LoopSurvey:
         tell(done, 6)
         parts.append(attempt(what, part, without))
     tell(6, 6)
-    return LoopSurvey(design, loops, forms, *parts, tuple(dict.fromkeys(refused)))
+    break_points, points, budgets, border = parts
+    why = tuple(dict.fromkeys(refused))
+    return LoopSurvey(design, loops, forms, break_points, points, budgets, border, why)
 
 
 def _other_form(design: Design, form: Form, refused: list[str]) -> Mapping[str, LoopFigures]:
