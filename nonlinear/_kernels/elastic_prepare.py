@@ -19,7 +19,7 @@ LARGEST_POWER = 700.0  # of e in double precision
 
 
 def prepare_elastic_sizes(p):
-    """Shares, segments of friction, halvings of the period, and how long p is; it reaches to `EL_LEAST`."""
+    """Shares, friction segments, halvings of the period, and the length of p, which reaches to `EL_LEAST`."""
     put_shares(p)
     norm, modes = 0.0, mode_count(p)
     for number in range(modes):  # one after the other in the place of the first

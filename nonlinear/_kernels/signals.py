@@ -54,9 +54,9 @@ def chirp_cycles(kind, f0, f1, span, s):
 
 
 def signal(row, at, tables, k, period):
-    """Value at tick k of the signal of eight numbers from ``row[at]`` on: kind, amplitude, start time,"""
-    # then frequency and phase (sine, triangle), stop time (ramp), f0, f1 and span (chirps), offset and length
-    # in the tables (table: held after its end)
+    """Value at tick k of the signal whose eight numbers begin at ``row[at]``."""
+    # kind, amplitude, start time; then frequency and phase (sine, triangle), stop time (ramp), f0, f1 and
+    # span (chirps), offset and length in the tables (table: held after its end)
     kind = int(row[at])
     if kind == layout.NONE:
         return 0.0
