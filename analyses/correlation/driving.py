@@ -153,7 +153,6 @@ def at_ticks(driven: Driven, time_s: Floats, duration_s: float, early_s: Floats)
     still is a step of the command, and comes ``early_s`` (one for each) before the later sample.
     """
     period = driven.design.controller.period_s
-    curve = _lines if driven.between == STRAIGHT else _smooth
     ticks = np.asarray(np.arange(round(duration_s / period) + 1) * period, dtype=np.float64)
     values = np.empty_like(ticks)
     later = driven.steps
@@ -164,12 +163,9 @@ def at_ticks(driven: Driven, time_s: Floats, duration_s: float, early_s: Floats)
         return ticks, np.repeat(driven.values[starts], np.diff(edges, append=len(ticks)))
     for start, end, first, last in zip(starts, ends, edges, [*edges[1:], len(ticks)], strict=True):
         part = slice(start, end)
-        values[first:last] = curve(time_s[part], driven.values[part], ticks[first:last])
+        points, at = (time_s[part], driven.values[part]), ticks[first:last]
+        values[first:last] = np.interp(at, *points) if driven.between == STRAIGHT else _smooth(*points, at)
     return ticks, values
-
-
-def _lines(time_s: Floats, values: Floats, at_s: Floats) -> Floats:
-    return np.interp(at_s, time_s, values)
 
 
 def _smooth(time_s: Floats, values: Floats, at_s: Floats) -> Floats:

@@ -189,14 +189,9 @@ def _held_at_zero(fit: TwoMass) -> TwoMass:
     below = [name for name in two_mass.FLOORS if name in fit.names and fit[name] < 0.0]
     if not below:
         return fit
-    gone = [fit.names.index(name) for name in below]
-    rest = fit.renamed({name: name for name in fit.names if name not in below})
-    beside = fit.covariance[gone][:, [fit.names.index(name) for name in rest.names]]
-    values = rest.values - fit.values[gone] @ np.linalg.solve(fit.covariance[np.ix_(gone, gone)], beside)
-    fixed = {**fit.fixed, **dict.fromkeys(below, Fixed(value=0.0, reason="would come out negative"))}
-    return _held_at_zero(
-        replace(fit, names=rest.names, values=values, covariance=rest.covariance, fixed=fixed)
-    )
+    zero = Fixed(value=0.0, reason="would come out negative")
+    found = {**vars(fit.at(dict.fromkeys(below, 0.0))), "fixed": {**fit.fixed, **dict.fromkeys(below, zero)}}
+    return _held_at_zero(replace(fit, **found))
 
 
 def _besides(design: Design) -> dict[str, tuple[float, float]]:

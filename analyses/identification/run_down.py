@@ -12,7 +12,7 @@ from scipy.stats import f as variance_ratio
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
 from actuator_lti.types import Floats
-from analyses.estimation.fit import Fixed
+from analyses.estimation.fit import Fit, Fixed
 from analyses.estimation.least_squares import scaled_lstsq, told_apart, wider_covariance
 from analyses.estimation.parameters import default_value
 from analyses.identification.asked import Settings
@@ -98,12 +98,12 @@ def decay_of(design: Design, record: Record, *, found: bool = True) -> Decay:
     seen = record[RATES[design.axis]] if place is None else place[1]
     speed = motion_of(design, record, recipe_for(record))[0].velocity
     side = 1 if float(np.sum(speed)) >= 0.0 else -1
-    time, speed, first = (
-        period * np.arange(len(seen)),
-        side * speed,
-        [] if place is None else [side * seen[0]],
-    )
-    if _moves_again(speed, period):
+    time, speed, most = period * np.arange(len(seen)), side * speed, float(np.max(np.abs(speed)))
+    first = [] if place is None else [side * seen[0]]
+    # what moves, for 30 ms or more at a tenth of the largest speed, has not stood or turned back before
+    far = lasting(np.abs(speed) > SLOW * most, max(round(REST_TIME_S / period), 6))
+    since, until = (np.logical_or.accumulate(far[::step])[::step] for step in (1, -1))
+    if np.any(speed[since & until] < REST_SHARE * most):
         told = "it moves again after it stood: a run-down is one decay, each a file of its own"
         raise InputError(told, where=record.name)
     moves = speed > SLOW * np.max(speed)
@@ -123,14 +123,15 @@ def decay_of(design: Design, record: Record, *, found: bool = True) -> Decay:
         w = np.where(time < stop, w0 - (p * w0 + q) * held, 0.0)
         return w, w if place is None else x[0] + w0 * held - q * (np.minimum(time, stop) - held) / p
 
+    def off(x: Floats) -> Floats:
+        return goes * (decay(x)[1] - side * seen)
+
     # at rest a position errs by one part of a count
     goes = moves | (decay(np.append(begin, about[1:]))[0] > 0.0)
     start = np.append(begin, given) if found else begin
     slope = np.array([float(np.mean(speed[moves])), 1.0])  # of the deceleration over both ratios
     with np.errstate(over="ignore", invalid="ignore"):  # where nothing tells them they grow without bound
-        solved = least_squares(
-            lambda x: goes * (decay(x)[1] - side * seen), start, method="lm", x_scale="jac"
-        )
+        solved = least_squares(off, start, method="lm", x_scale="jac")
         p, q = ratios = np.asarray(solved.x[len(begin) :] if found else given)
         w = decay(solved.x)[0]
         covariance = _covariance(solved.jac[goes], solved.fun[goes], len(begin))
@@ -148,14 +149,6 @@ def decay_of(design: Design, record: Record, *, found: bool = True) -> Decay:
         at_place=place is not None,
         step_s=period,
     )
-
-
-def _moves_again(speed: Floats, period_s: float) -> bool:
-    """Whether what moves, for 30 ms or more at a tenth of the largest speed, stood or turned back before."""
-    most = float(np.max(np.abs(speed)))
-    far = lasting(np.abs(speed) > SLOW * most, max(round(REST_TIME_S / period_s), 6))
-    since, until = (np.logical_or.accumulate(far[::step])[::step] for step in (1, -1))
-    return bool(np.any(speed[since & until] < REST_SHARE * most))
 
 
 def _covariance(slopes: Floats, rest: Floats, begin: int) -> Floats:
@@ -192,7 +185,11 @@ def fit_run_downs(
     found = tuple(free[k] for k in picked)
     values, covariance, condition = _solved(decays, table, found, own)
     total = own["inertia"] if inertia else float(values[found.index("inertia")])
-    values = _possible(found, values, total**2 * covariance)
+    # friction below zero within its error is none, and the others as expected beside that
+    fit = Fit(names=found, values=values, covariance=total**2 * covariance)
+    none = {name: 0.0 for name in found if name != "offset" and -2.0 * fit.std(name) <= fit[name] < 0.0}
+    expected = fit.at(none)
+    values = np.array([none[name] if name in none else expected[name] for name in found])
     fixed = {"load_coefficient": Fixed(value=design.friction.load_coefficient, reason=NO_LOAD)}
     fixed |= {name: Fixed(value=value, reason="fixed as asked") for name, value in held.items()}
     for each in left:
@@ -203,15 +200,14 @@ def fit_run_downs(
     for name in ["inertia"] if inertia else known:
         moves = dict(zip(found, (values / own[name]).tolist(), strict=True))
         fixed[name] = Fixed(value=own[name], reason=why, moves=moves)
-    parts = tuple(
-        _part(design, *pair, form, found, values, total) for pair in zip(records, decays, strict=True)
-    )
+    pairs = zip(records, decays, strict=True)
+    parts = tuple(_part(design, *pair, form, found, values, total) for pair in pairs)
     drive, rest = (np.concatenate([getattr(part, name) for part in parts]) for name in ("y", "residual"))
     return JointModel(
         names=found,
         values=values,
-        white_errors=total * np.sqrt(np.diag(covariance)),
-        covariance=total**2 * covariance,
+        white_errors=fit.standard_errors,
+        covariance=fit.covariance,
         between={},
         fixed=fixed,
         relative_residual=float(np.linalg.norm(rest) / np.linalg.norm(drive)),
@@ -235,15 +231,6 @@ def _solved(
     values, weighed = scaled_lstsq(weighed[:, :-1], weighed[:, -1]), weighed[:, :-1]
     condition = np.linalg.cond(columns / np.linalg.norm(columns, axis=0))
     return values, np.linalg.inv(weighed.T @ weighed), float(condition)
-
-
-def _possible(names: Sequence[str], values: Floats, covariance: Floats) -> Floats:
-    """The values; friction below zero within its error is none, and the others as expected beside that."""
-    least = -2.0 * np.sqrt(np.diag(covariance))
-    none = [k for k, name in enumerate(names) if name != "offset" and least[k] <= values[k] < 0.0]
-    moved = values - covariance[:, none] @ scaled_lstsq(covariance[np.ix_(none, none)], values[none])
-    moved[none] = 0.0
-    return moved
 
 
 def _balance(decays: Sequence[Decay], form: FrictionForm) -> Floats:
@@ -286,17 +273,8 @@ def _part(
     table = scale * np.column_stack([decay.answer(shapes[name.partition("_")[0]]) for name in names])
     rest, inputs = scale * inertia * decay.rest, np.column_stack([decay.speed, decay.acceleration])
     more = {"residual": rest, "own_residual": rest, "noise": rest, "inputs": inputs}
-    every = np.ones(count, dtype=bool)
-    own = replace(
-        rows,
-        names=tuple(names),
-        w=table,
-        y=table @ values + rest,
-        speed=decay.speed,
-        acceleration=decay.acceleration,
-        step_s=record.period_s,
-        keep=every,
-        answer=lambda torque: scale * decay.answer(torque),
-    )
-    friction = -inertia * decay.acceleration + rest
-    return RecordFit(**vars(own), **more, friction=friction, compared=every)
+    more |= {"friction": rest - inertia * decay.acceleration, "names": tuple(names), "w": table}
+    more |= {"y": table @ values + rest, "speed": decay.speed, "acceleration": decay.acceleration}
+    more |= {"step_s": record.period_s, "answer": lambda torque: scale * decay.answer(torque)}
+    more |= dict.fromkeys(("keep", "compared"), np.ones(count, dtype=bool))
+    return RecordFit(**{**vars(rows), **more})

@@ -104,10 +104,10 @@ def import_campaign(campaign: Campaign, *, progress: Progress = None) -> Importe
     for k, entry in enumerate(campaign.runs, 1):
         try:
             drive, sensor = read_record(entry.drive, campaign.drive), None
-            if entry.sensor is not None and campaign.sensor is None:
-                told = f"run {entry.id} has a sensor file, but there is no [sensor]"
-                raise InputError(told, where=campaign.origin)
-            if entry.sensor is not None and campaign.sensor is not None:
+            if entry.sensor is not None:
+                if campaign.sensor is None:
+                    told = f"run {entry.id} has a sensor file, but there is no [sensor]"
+                    raise InputError(told, where=campaign.origin)
                 sensor = read_record(entry.sensor, campaign.sensor)
             runs.append(assemble_run(campaign, entry, drive, sensor))
         except InputError as error:

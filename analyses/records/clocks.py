@@ -141,19 +141,15 @@ def motion_events(time_s: Floats, magnitude: Floats) -> tuple[float, float] | No
 
 def _check_durations(a: Series, b: Series, names: tuple[str, str], where: str) -> None:
     """Refuse two records in which one happening lasts differently long: no clock is off by so much."""
-    span_a, span_b = (0.0 if one is None else one[1] for one in (motion_events(*a), motion_events(*b)))
-    if not (span_a > 0.0 and span_b > 0.0):
+    first, second = spans = np.array([(motion_events(*one) or (0.0, 0.0))[1] for one in (a, b)])
+    steps = np.array([np.median(np.diff(one.time_s)) for one in (a, b)])
+    if not np.all(spans) or abs(first / second - 1.0) <= RATE_SPREAD + 3.0 * np.max(steps / spans):
         return
-    ratio = span_a / span_b
-    step = max(float(np.median(np.diff(a.time_s))) / span_a, float(np.median(np.diff(b.time_s))) / span_b)
-    if abs(ratio - 1.0) <= RATE_SPREAD + 3.0 * step:
-        return
-    factor = named_factor(ratio)
     told = f"the {names[1]} came or went at another time than the {names[0]}, a clock is off, or the records "
     told += 'are of two runs; allowed: join.method = "given" with run.offset'
-    lasts = f"the {names[0]} lasts {span_a:.4g} s, the {names[1]} in the other record {span_b:.4g} s"
-    told = f"factor {factor}" if factor else told
-    raise Mismatch(f"{lasts}, {ratio:.4f} times as long: {told}", where=where)
+    lasts = f"the {names[0]} lasts {first:.4g} s, the {names[1]} in the other record {second:.4g} s"
+    told = f"factor {factor}" if (factor := named_factor(first / second)) else told
+    raise Mismatch(f"{lasts}, {first / second:.4f} times as long: {told}", where=where)
 
 
 def _by_event(a: Series, b: Series, where: str) -> ClockJoin:
