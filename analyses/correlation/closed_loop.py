@@ -204,11 +204,8 @@ def _nearest(
 
     if moving is not initial:
         part = {name: values[:FIRST_ROWS] for name, values in measured.items()}
-        until = float(time[:FIRST_ROWS][-1]) + 2.0 * period
-        early = driven.likely_s
-        rest, goes = (
-            signals_at(model, run(driven, early, until=until, at=at), time) for at in (initial, moving)
-        )
+        begin = partial(run, driven, driven.likely_s, until=float(time[:FIRST_ROWS][-1]) + 2.0 * period)
+        rest, goes = (signals_at(model, begin(at=at), time) for at in (initial, moving))
         if _off(part, goes) < _off(part, rest):
             initial = moving
             notes.append("the record begins in motion or under load, and so does the model")

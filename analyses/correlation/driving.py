@@ -259,14 +259,12 @@ def first_states(driven: Driven, record: Record, measured: Mapping[str, Floats])
             values = measured[name]
             early = float(np.median(values[:FIRST_ROWS]))
             speed = factor * early if abs(early) > IN_MOTION * float(np.max(np.abs(values))) else 0.0
-    values = record.signals.get("current", np.zeros(1))
-    current = float(np.median(values[:FIRST_ROWS]))
+    values, ideal = record.signals.get("current", np.zeros(1)), motor.source_gain_Nm_V is not None
     holds = float(np.median(np.abs(values[:FIRST_ROWS]))) > 0.1 * float(np.max(np.abs(values)))
-    if motor.source_gain_Nm_V is not None or (speed == 0.0 and not holds):
-        current = 0.0
+    current = float(np.median(values[:FIRST_ROWS])) if not ideal and (speed or holds) else 0.0
     if speed == 0.0 and current == 0.0:
         return rest, rest
-    volts = 0.0 if motor.source_gain_Nm_V is not None else steady_voltage_V(design, current, speed)
+    volts = 0.0 if ideal else steady_voltage_V(design, current, speed)
     cascaded = design.controller.current is not None
     first = float(driven.values[0])
     return rest, replace(

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from actuator_lti.design import read_design_text, write_design
+from actuator_lti.design import parameter_value, read_design_text, write_design
 from actuator_lti.design.model import Coupling, Design, LoadFriction
 from actuator_lti.errors import InputError, NumericalError
 from actuator_lti.types import Floats
@@ -204,12 +204,9 @@ def _besides(design: Design) -> dict[str, tuple[float, float]]:
 
 def _written_item(written: Design, lines: Lines, record: str, reaction: float) -> Item:
     """The response of the design as it was written against the measured lines."""
-    coupling, friction = written.coupling, written.load.friction or LoadFriction()
-    assert coupling is not None
-    inertias = written.motor_side_inertia_kgm2, written.load_side_inertia_kgm2
-    own = (*inertias, coupling.stiffness_Nm_rad, coupling.damping_Nms_rad)
-    values = (*own, written.friction.viscous_Nms_rad, friction.viscous_Nms_rad)
-    named = dict(zip(two_mass.NAMES, values, strict=True))
+    named = {name: parameter_value(written, parameter(name).key) for name in two_mass.NAMES}
+    named["motor_inertia"] = written.motor_side_inertia_kgm2
+    named["load_inertia"] = written.load_side_inertia_kgm2
     model, _ = two_mass.angle_responses(lines.omega_rad_s, named, written.ratio_to_coupling, reaction)
     measured, relative = two_mass.response(lines)
     weight = 1.0 / np.maximum(relative, 1e-3)

@@ -244,8 +244,8 @@ def _scales(start: Mapping[str, float], names: tuple[str, ...]) -> Floats:
     size = {
         "damping": 0.01 * start["stiffness"] / natural,
         "viscous": 0.01 * start["motor_inertia"] * natural,
-        "load_viscous": 0.01 * start["load_inertia"] * natural,
     }
+    size["load_viscous"] = 0.01 * start["load_inertia"] * natural
     return np.array([max(abs(start.get(name, 0.0)), size.get(name, 0.0)) for name in names])
 
 

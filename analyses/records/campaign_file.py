@@ -149,8 +149,9 @@ def _check(campaign: Campaign) -> None:
     identities = Counter(run.id for run in campaign.runs)
     lacking = {"current", "speed"} - {signal.name for signal in campaign.drive.signals}
     wrong = [f'run.id = "{identity}": given twice' for identity, times in identities.items() if times > 1]
-    for told in (*wrong, *(f"drive.signals.{name}: is needed" for name in sorted(lacking))):
-        raise InputError(told, where=campaign.origin)
+    wrong += [f"drive.signals.{name}: is needed" for name in sorted(lacking)]
+    if wrong:
+        raise InputError(wrong[0], where=campaign.origin)
 
 
 def _run(table: Table, folder: Path) -> RunEntry:

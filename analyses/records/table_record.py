@@ -62,7 +62,7 @@ class SiRows:
         self._spec, self._counts, self._origin = spec, counts, origin
         self._factor = spec.time.tick_s or unit_factor(spec.time.unit, "s", "time")
         self._factors = [to_si(signal)[0] for signal in spec.signals]
-        self._row, self._wraps, self._last_time = 0, 0.0, -np.inf
+        self._wraps, self._last_time = 0.0, -np.inf
         self._last_raw: float | None = None
 
     def __call__(self, block: Block) -> Floats:
@@ -70,8 +70,7 @@ class SiRows:
         spec, times = self._spec, self._spec.time
         block = self._without_missing(block)
         if times.period_s is not None:
-            time, raw = (self._row + np.arange(len(block.values))) * times.period_s, block.values
-            self._row += len(time)
+            time, raw = (self._counts.rows_out + np.arange(len(block.values))) * times.period_s, block.values
         else:
             if times.minimum is not None:
                 late = block.values[:, 0] >= times.minimum
@@ -119,13 +118,14 @@ class SiRows:
         keep = np.asarray(time > reached[:-1])
         if not keep.all() and self._spec.disorder == "error":
             k = int(keep.argmin())
-            message = f"time {time[k]:.15g} s does not come after {reached[k]:.15g} s"
+            told = f"time {time[k]:.15g} s does not come after {reached[k]:.15g} s"
             if time[k] == reached[k]:
-                message += ": a row twice, or stamps of too few digits (then give time.period, not a column)"
-            message += "; allowed: rising times: a "
-            message += 'file for each run; or disorder = "drop" in a record file, which leaves out this row '
-            message += "and all that follow up to the time that was reached"
-            raise InputError(message, where=f"{self._origin}:{block.lines[k]}")
+                told += ": a row twice, or stamps of too few digits (then give time.period, not a column)"
+            told += (
+                '; allowed: rising times: a file for each run; or disorder = "drop" in a record file, which '
+            )
+            told += "leaves out this row and all that follow up to the time that was reached"
+            raise InputError(told, where=f"{self._origin}:{block.lines[k]}")
         return keep
 
 
