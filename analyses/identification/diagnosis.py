@@ -21,6 +21,8 @@ from analyses.records.consistency import ALIKE, SURE, Finding, clock_doubt, resi
 from analyses.records.naming import KNOWN_UNITS
 from analyses.records.record import Record, lasting
 
+Fitting = Callable[[Sequence[Record]], JointModel]
+Fitting = Callable[[Sequence[Record]], JointModel]
 LEAST_RUN = 3  # samples in a row at the largest or smallest value of all: a flat top
 ROUNDS = 8
 SETTLED = 0.1
@@ -57,11 +59,7 @@ class Diagnosed:
 
 
 def diagnosed(
-    design: Design,
-    start: Design,
-    records: Sequence[Record],
-    fit: Callable[[Sequence[Record]], JointModel],
-    recipe: Recipe | None,
+    design: Design, start: Design, records: Sequence[Record], fit: Fitting, recipe: Recipe | None
 ) -> Diagnosed:
     """Fit records, rows of clipped current left out and lags taken back where they are sure.
 

@@ -121,11 +121,7 @@ def _columns(tables: Sequence[Floats], names: Sequence[str]) -> tuple[Floats, Fl
 
 
 def without_own_bias(
-    fit: ElectricalFit,
-    start: Design,
-    records: Sequence[Record],
-    model: JointModel,
-    recipe: Recipe | None = None,
+    fit: ElectricalFit, start: Design, records: Sequence[Record], model: JointModel, recipe: Recipe | None
 ) -> ElectricalFit:
     """The fit less what the same fit finds too much in records simulated with the motor of ``start``.
 

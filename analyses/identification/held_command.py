@@ -30,6 +30,9 @@ from analyses.identification.output_error import ITERATIONS, fit_output, simulat
 from analyses.identification.own_bias import same_fit, with_model_signals, with_noise
 from analyses.records.record import Record
 
+Pair = tuple[Floats, Floats]
+Records = Sequence[Record]
+Nearest = Callable[[Records], bool]
 INDUCTANCE = parameter("inductance").key
 BACK, TORQUE = parameter("back_emf").key, parameter("torque_constant").key
 NOT_SHOWN = "the records do not show it (they are as likely with none)"
@@ -39,11 +42,7 @@ SETTLED = 0.05  # of what a signal leaves, within which its weight may still mov
 
 
 def found_together(
-    design: Design,
-    records: Sequence[Record],
-    model: JointModel,
-    others: Sequence[Sequence[Record]],
-    is_nearest: Callable[[Sequence[Record]], bool],
+    design: Design, records: Records, model: JointModel, others: Sequence[Records], is_nearest: Nearest
 ) -> Fit | None:
     """Values of the motion and of the motor, by their names, with which the simulated drive has the records.
 
@@ -87,7 +86,7 @@ class _Likeliest:
     keys: tuple[str, ...]
     parts: Sequence[Record]
     sizes: Floats  # of what is left of each signal
-    told: Sequence[tuple[Floats, Floats]]  # slopes of each over the values, what is left, of unit size
+    told: Sequence[Pair]  # slopes of each over the values, what is left, of unit size
     unlikely: float  # twice the negative logarithm of the likelihood of white noise, but for a constant
     freed: _Likeliest | None = None  # where the inductance is found too, though the records do not show it
 
@@ -118,12 +117,7 @@ class _Search:
     design: Design
     keys: tuple[str, ...]
 
-    def by_simulation(
-        self,
-        records: Sequence[Record],
-        others: Sequence[Sequence[Record]],
-        is_nearest: Callable[[Sequence[Record]], bool],
-    ) -> Fit | None:
+    def by_simulation(self, records: Records, others: Sequence[Records], is_nearest: Nearest) -> Fit | None:
         """Values with which the simulated drive has the currents and voltages of records."""
         parts = [simulated_part(self.design, record) for record in records]
         wanted = _drives(parts)
@@ -160,13 +154,7 @@ class _Search:
         return _Search(self.design, rest).likeliest(parts, sizes, start, rounds=1)
 
     def likeliest(
-        self,
-        parts: Sequence[Record],
-        sizes: Floats,
-        start: Design,
-        *,
-        rounds: int = ITERATIONS,
-        than: float = np.inf,
+        self, parts: Records, sizes: Floats, start: Design, *, rounds: int = ITERATIONS, than: float = np.inf
     ) -> _Likeliest:
         """Search from ``start``, each signal weighed by what is left of it, until that settles.
 
@@ -195,9 +183,8 @@ class _Search:
             told = [(w / size, e / size) for w, e, size in zip(slopes, rests, left, strict=True)]
             gram, moves = np.sum([w.T @ w for w, _ in told], axis=0), np.zeros(len(parts))
             for k, part in enumerate(parts):
-                pair = slice(2 * k, 2 * k + 2)
-                own = start, part, sizes[pair], told[pair]
-                parts[k], told[pair], moves[k] = _at_its_rows(*own, gram, anywhere=turn == 0)
+                pair, at = slice(2 * k, 2 * k + 2), (start, part)
+                parts[k], told[pair], moves[k] = _at_its_rows(*at, sizes[pair], told[pair], gram, turn == 0)
             settled = np.all(np.abs(left - 1.0) < SETTLED) and moves.max() < SETTLED
             if settled or before - unlikely < unlikely - than:
                 break
@@ -228,14 +215,8 @@ class _Search:
 
 
 def _at_its_rows(
-    design: Design,
-    part: Record,
-    sizes: Floats,
-    told: Sequence[tuple[Floats, Floats]],
-    gram: Floats,
-    *,
-    anywhere: bool,
-) -> tuple[Record, Sequence[tuple[Floats, Floats]], float]:
+    design: Design, part: Record, sizes: Floats, told: Sequence[Pair], gram: Floats, anywhere: bool
+) -> tuple[Record, Sequence[Pair], float]:
     """A record with its rows where they likeliest are between the ticks, and the slopes without that.
 
     ``told``: slopes over the values and what is left, of unit size. Also the move, in its standard errors;

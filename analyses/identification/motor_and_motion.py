@@ -174,10 +174,9 @@ class Sought:
         self, start: Design, records: Sequence[Record], weights: Sequence[float] | None = None
     ) -> JointModel:
         """The joint model as the settings ask; with weights of the records, see `fit_records`."""
-        fit, form = fit_map, self.settings.friction
-        if form != "map":
-            fit = partial(fit_records, form=form, weights=weights)
-        return fit(start, records, recipe=self.recipe, fixed=self.held, gravity=self.gravity)
+        asked = {"recipe": self.recipe, "fixed": self.held, "gravity": self.gravity}
+        fit, form = partial(fit_records, start, records, **asked), self.settings.friction
+        return fit_map(fit) if form == "map" else fit(form=form, weights=weights)
 
     def _fitted(self, start: Design, records: Sequence[Record], both: Fit | None) -> JointModel:
         """That, less its own bias, or with what was found with the motor."""

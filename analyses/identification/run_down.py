@@ -16,7 +16,7 @@ from analyses.estimation.fit import Fit, Fixed
 from analyses.estimation.least_squares import scaled_lstsq, told_apart, wider_covariance
 from analyses.estimation.parameters import default_value
 from analyses.identification.asked import Settings
-from analyses.identification.joint_model import NAMES, FrictionForm, JointModel, RecordFit
+from analyses.identification.joint_model import NAMES, FrictionForm, JointModel, RecordFit, Rows
 from analyses.identification.rows import (
     REST_SHARE,
     REST_TIME_S,
@@ -80,6 +80,21 @@ class Decay:
         of_speed = lfilter([0.0, -self.step_s], [1.0, -fall], np.where(self.speed, torque, 0.0))
         made = self.step_s * np.cumsum(of_speed) if self.at_place else of_speed * (self.speed != 0.0)
         return np.asarray(made - self.begin @ scaled_lstsq(self.begin, made))
+
+    def part(self, rows: Rows, names: tuple[str, ...], values: Floats, inertia: float) -> RecordFit:
+        """The rows of its record: what each torque makes of what is recorded, times inertia over time."""
+        speed, acceleration, count = self.speed, self.acceleration, len(self.speed)
+        scale = (self.step_s * count) ** -(2.0 if self.at_place else 1.0)
+        shapes = {"inertia": acceleration, "viscous": speed, "offset": np.ones(count)}
+        shapes["dry"] = np.full(count, float(self.side))
+        table = scale * np.column_stack([self.answer(shapes[name.partition("_")[0]]) for name in names])
+        rest, inputs = scale * inertia * self.rest, np.column_stack([speed, acceleration])
+        more = {"residual": rest, "own_residual": rest, "noise": rest, "inputs": inputs}
+        more |= {"friction": rest - inertia * acceleration, "names": names, "w": table}
+        more |= {"y": table @ values + rest, "speed": speed, "acceleration": acceleration}
+        more |= {"step_s": self.step_s, "answer": lambda torque: scale * self.answer(torque)}
+        more |= dict.fromkeys(("keep", "compared"), np.ones(count, dtype=bool))
+        return RecordFit(**{**vars(rows), **more})
 
     @property
     def relative_error(self) -> float:
@@ -200,8 +215,8 @@ def fit_run_downs(
     for name in ["inertia"] if inertia else known:
         moves = dict(zip(found, (values / own[name]).tolist(), strict=True))
         fixed[name] = Fixed(value=own[name], reason=why, moves=moves)
-    pairs = zip(records, decays, strict=True)
-    parts = tuple(_part(design, *pair, form, found, values, total) for pair in pairs)
+    rows = [record_rows(design, record, form, None) for record in records]
+    parts = tuple(one.part(own, found, values, total) for one, own in zip(decays, rows, strict=True))
     drive, rest = (np.concatenate([getattr(part, name) for part in parts]) for name in ("y", "residual"))
     return JointModel(
         names=found,
@@ -254,27 +269,3 @@ def _said(decays: Sequence[Decay], axis: str) -> str:
         for one, (p, q) in zip(decays, errors, strict=True)
     ]
     return f"a run-down shows friction over inertia alone, {'; '.join(each)}"
-
-
-def _part(
-    design: Design,
-    record: Record,
-    decay: Decay,
-    form: FrictionForm,
-    names: Sequence[str],
-    values: Floats,
-    inertia: float,
-) -> RecordFit:
-    """The rows of one record: what each torque makes of what is recorded, times inertia over time."""
-    rows, count = record_rows(design, record, form, None), len(record)
-    scale = (record.period_s * count) ** -(2.0 if decay.at_place else 1.0)
-    shapes = {"inertia": decay.acceleration, "viscous": decay.speed, "offset": np.ones(count)}
-    shapes["dry"] = np.full(count, float(decay.side))
-    table = scale * np.column_stack([decay.answer(shapes[name.partition("_")[0]]) for name in names])
-    rest, inputs = scale * inertia * decay.rest, np.column_stack([decay.speed, decay.acceleration])
-    more = {"residual": rest, "own_residual": rest, "noise": rest, "inputs": inputs}
-    more |= {"friction": rest - inertia * decay.acceleration, "names": tuple(names), "w": table}
-    more |= {"y": table @ values + rest, "speed": decay.speed, "acceleration": decay.acceleration}
-    more |= {"step_s": record.period_s, "answer": lambda torque: scale * decay.answer(torque)}
-    more |= dict.fromkeys(("keep", "compared"), np.ones(count, dtype=bool))
-    return RecordFit(**{**vars(rows), **more})

@@ -131,8 +131,7 @@ def assemble_run(campaign: Campaign, entry: RunEntry, drive: Record, sensor: Rec
         if sensor is None:
             raise InputError(f"run {entry.id}: no torque signal and no sensor file", where=campaign.origin)
         how = campaign.join
-        signals = {"first_signal": how.drive_signal, "second_signal": how.sensor_signal}
-        join = clock_join(drive, sensor, **signals, method=how.method, offset_s=entry.offset_s)
+        join = clock_join(drive, sensor, how, entry.offset_s)
         join = join if how.method == "given" else by_current(drive, sensor, join, how.sensor_signal)
         record = joined_by(drive, sensor, join)
     if not np.any(record["speed"]):

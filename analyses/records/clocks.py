@@ -10,7 +10,7 @@ from actuator_lti.errors import InputError
 from actuator_lti.types import Floats
 from analyses.estimation.means import best_lag, correlation_time
 from analyses.estimation.smoothing import without_noise
-from analyses.records.campaign_file import Method
+from analyses.records.campaign_file import Join
 from analyses.records.factors import named_factor
 from analyses.records.record import Record
 from analyses.records.single_rows import NORMAL
@@ -60,15 +60,7 @@ class Series(NamedTuple):
     values: Floats
 
 
-def clock_join(
-    first: Record,
-    second: Record,
-    *,
-    first_signal: str,
-    second_signal: str,
-    method: Method = "correlation",
-    offset_s: float | None = None,
-) -> ClockJoin:
+def clock_join(first: Record, second: Record, how: Join, offset_s: float | None = None) -> ClockJoin:
     """How a second recorder's time goes on that of the first (`joined_by` puts its signals there).
 
     Of the signals that show the shared happening, such as the motor's speed and the clutch's torque, only
@@ -78,19 +70,17 @@ def clock_join(
     together with the rate by least squares. As ``given``: ``offset_s``, the first clock's time at the
     second clock's zero.
     """
-    if method == "given":
+    names = how.drive_signal, how.sensor_signal
+    if how.method == "given":
         if offset_s is None:
             raise InputError('join method "given": needs an offset', where=second.name)
         join = ClockJoin(offset_s=offset_s)
-    elif method not in ("event", "correlation"):
-        raise InputError(f'join method "{method}": "event", "correlation" or "given"')
     else:
-        a = Series(first.time_s, np.abs(first[first_signal]))
-        b = Series(second.time_s, np.abs(second[second_signal]))
+        a, b = (Series(one.time_s, np.abs(one[n])) for one, n in zip((first, second), names, strict=True))
         where = f"{first.name} with {second.name}"
-        _check_durations(a, b, (first_signal, second_signal), where)
-        join = (_by_event if method == "event" else _by_correlation)(a, b, where)
-    return replace(join, method=method, first_signal=first_signal, second_signal=second_signal)
+        _check_durations(a, b, names, where)
+        join = (_by_event if how.method == "event" else _by_correlation)(a, b, where)
+    return replace(join, method=how.method, first_signal=names[0], second_signal=names[1])
 
 
 def joined_by(first: Record, second: Record, join: ClockJoin) -> Record:

@@ -129,13 +129,7 @@ class SiRows:
         return keep
 
 
-def record_of_columns(
-    vectors: Mapping[str, Floats],
-    spec: RecordSpec,
-    path: Path,
-    digest: str,
-    constants: Mapping[str, float] | None = None,
-) -> Record:
+def record_of_columns(vectors: Mapping[str, Floats], spec: RecordSpec, path: Path, digest: str) -> Record:
     """Read the columns that a spec names; NaN and disorder in time are treated as in a CSV file."""
     header = tuple(vectors)
     names = [header[k] for k in spec.positions(header, str(path))]
@@ -154,17 +148,11 @@ def record_of_columns(
     counts = RowCounts(rows_in=len(table), columns=header)
     block = Block(values=table, lines=np.arange(1, len(table) + 1))
     rows = SiRows(spec, counts, f"{path}, row")(block)
-    return record_of_rows(rows, spec, path, counts, digest, constants=constants)
+    return record_of_rows(rows, spec, path, counts, digest)
 
 
 def record_of_rows(
-    rows: Floats,
-    spec: RecordSpec,
-    path: Path,
-    counts: RowCounts,
-    digest: str,
-    averaged: int = 1,
-    constants: Mapping[str, float] | None = None,
+    rows: Floats, spec: RecordSpec, path: Path, counts: RowCounts, digest: str, averaged: int = 1
 ) -> Record:
     """A record of rows of time and signals in SI, its holes filled."""
     if len(rows) < 2:
@@ -187,7 +175,6 @@ def record_of_rows(
         counts=counts,
         averaged=averaged,
         sha256=digest,
-        constants=MappingProxyType(dict(constants or {})),
         notes=tuple(notes),
         inputs=inputs_of(spec, counts.columns),
         resample_tolerance=spec.resample_tolerance,
