@@ -174,8 +174,8 @@ class Sought:
         self, start: Design, records: Sequence[Record], weights: Sequence[float] | None = None
     ) -> JointModel:
         """The joint model as the settings ask; with weights of the records, see `fit_records`."""
-        asked = {"recipe": self.recipe, "fixed": self.held, "gravity": self.gravity}
-        fit, form = partial(fit_records, start, records, **asked), self.settings.friction
+        fit, form = partial(fit_records, start, records, gravity=self.gravity), self.settings.friction
+        fit = partial(fit, recipe=self.recipe, fixed=self.held)
         return fit_map(fit) if form == "map" else fit(form=form, weights=weights)
 
     def _fitted(self, start: Design, records: Sequence[Record], both: Fit | None) -> JointModel:
