@@ -22,7 +22,6 @@ from analyses.records.naming import KNOWN_UNITS
 from analyses.records.record import Record, lasting
 
 Fitting = Callable[[Sequence[Record]], JointModel]
-Fitting = Callable[[Sequence[Record]], JointModel]
 LEAST_RUN = 3  # samples in a row at the largest or smallest value of all: a flat top
 ROUNDS = 8
 SETTLED = 0.1
