@@ -106,7 +106,7 @@ def motion_of(design: Design, record: Record, recipe: Recipe) -> tuple[Motion, s
 def stands(design: Design, record: Record, recipe: Recipe | None = None) -> bool:
     """Whether a record shows no motion: noise that is white, or that nothing of the drive's torque moves."""
     place, rate = place_of(design, record), RATES[design.axis]
-    if _too_short(record) or (place is None and rate not in record.signals):
+    if too_short(record) or (place is None and rate not in record.signals):
         return False  # it is refused for that
     if place is None:
         values = record[rate]
@@ -184,7 +184,7 @@ def record_rows(
     """
     record, shared = prepared(record), design
     design, period = record.drive(shared), period_of(record)
-    if _too_short(record):
+    if too_short(record):
         lasts = f"lasts {len(record) * period:.3g} s in {len(record)} rows"
         told = f"{lasts}: {SHORTEST_S:g} s and more are needed; is the unit of the time right?"
         raise InputError(told, where=record.name)
@@ -285,7 +285,8 @@ def _kept(record: Record, motion: Motion, part: slice, recipe: Recipe) -> Mask:
     return apart[(len(apart) - 1) % recipe.decimation :: recipe.decimation]
 
 
-def _too_short(record: Record) -> bool:
+def too_short(record: Record) -> bool:
+    """Whether a record is refused for how long it lasts."""
     return len(record) * period_of(record) < SHORTEST_S and not is_benchmark(record)
 
 

@@ -109,9 +109,11 @@ def zeros(axis: Axis, q: Form, edges: list[float]) -> list[arb]:
         if low == 0.0 and order_at_zero:
             if high < _NARROWEST * edges[1]:
                 raise NumericalError("a crossing next to zero frequency could not be determined")
-            return _order_holds(axis, q, high, order_at_zero)
-        inside, half = q.along(*axis.over(low, high)), _half(low, high)
-        value, slope = inside(half), inside.derivative()(half)
+            inside = axis.series([arb(0).union(arb(high))] * (order_at_zero + 1))
+            derivative = q.along(*inside)[order_at_zero]  # keeps its sign: no further zero there
+            return bool(derivative > 0 or derivative < 0)
+        along, half = q.along(*axis.over(low, high)), _half(low, high)
+        value, slope = along(half), along.derivative()(half)
         if value > 0 or value < 0:
             return True
         if slope > 0 or slope < 0:
@@ -163,13 +165,6 @@ def _order(series: fmpq_poly, first: int) -> int:
     raise NumericalError("the loop does not leave the line at zero frequency")
 
 
-def _order_holds(axis: Axis, q: Form, high: float, order: int) -> bool:
-    """Whether the derivative of that order keeps its sign on [0, high]: no further zero there."""
-    inside = arb(0).union(arb(high))
-    derivative = q.along(*axis.series([inside] * (order + 1)))[order]
-    return bool(derivative > 0 or derivative < 0)
-
-
 def turn(axis: Axis, edges: list[float]) -> arb:
     """Change of the angle of N + D along the intervals, rad."""
     total, last = arb(0), sum(axis.values(arb(0)), acb(0))
@@ -213,8 +208,10 @@ def smallest(axis: Axis, distance: Distance, start: Place = NOWHERE, top: float 
             inside = zeros(axis, nearer, axis.edges(loop.lowest, end))
             if not inside:
                 break
-            found = [_least(axis, distance, float(a.mid()), float(b.mid())) for a, b in pairwise(inside)]
-            value, w = min((value, w), *found)
+            for a, b in pairwise(float(x.mid()) for x in inside):
+                near, accuracy = partial(_value, axis, distance), {"xatol": 1e-9 * b}
+                best = minimize_scalar(near, bounds=(a, b), method="bounded", options=accuracy)
+                value, w = min((value, w), (float(best.fun), float(best.x)))
         if value < level * at_end:
             return value, w
     return value, w
@@ -230,11 +227,3 @@ def _at_rest(axis: Axis, distance: Distance) -> Place:
 def _value(axis: Axis, distance: Distance, x: float) -> float:
     above, below = distance.over(*(complex(part) for part in axis.values(arb(x))))
     return abs(above) / abs(below) if below else math.inf
-
-
-def _least(axis: Axis, distance: Distance, low: float, high: float) -> Place:
-    """Smallest value between two places, and where."""
-    best = minimize_scalar(
-        partial(_value, axis, distance), bounds=(low, high), method="bounded", options={"xatol": 1e-9 * high}
-    )
-    return float(best.fun), float(best.x)
