@@ -203,7 +203,7 @@ def capability(design: Design, load_Nm: float, settling_s: float) -> Capability:
 
     Behind the profile of the command, and without what depends on the angle: at one load, as the figures are.
     """
-    design = replace(design, command=Command(), load=design.load.level(), motor=design.motor.level())
+    design = replace(design, command=Command(), load=design.load.level(), motor=design.motor.straight())
     figures = drive_figures(design, load_Nm)
     rate, push = figures.output_rate_rad_s, figures.acceleration_rad_s2
     current, continuous = figures.motor_current_A, design.limits.continuous_current_A
