@@ -70,8 +70,10 @@ def _moves(weak: Sequence[View], design: Design) -> Iterator[Move]:
             first = _first(weak, design, path, steps)
             if first is not None and first > 0:
                 between = np.geomspace(steps[first - 1], steps[first], STEPS + 1)
-                place = _first(weak, design, path, between) or STEPS
-                yield Move(path, was, _written(float(between[place]), was))
+                value = float(between[_first(weak, design, path, between) or STEPS])
+                unit = 10.0 ** (np.floor(np.log10(abs(value))) - 2)  # three digits, away from what it was
+                written = unit * (np.ceil if value > was else np.floor)(value / unit * (1.0 - 1e-12))
+                yield Move(path, was, float(f"{written:.3g}"))
 
 
 def _first(weak: Sequence[View], design: Design, path: str, values: np.ndarray) -> int | None:
@@ -90,12 +92,6 @@ def _by_point(views: Iterable[View]) -> list[list[View]]:
     for view in views:
         points.setdefault((id(view.design), view.kind, view.load_Nm), []).append(view)
     return list(points.values())
-
-
-def _written(value: float, was: float) -> float:
-    """A value of three digits, away from what it was."""
-    unit = 10.0 ** (np.floor(np.log10(abs(value))) - 2)
-    return float(f"{unit * (np.ceil if value > was else np.floor)(value / unit * (1.0 - 1e-12)):.3g}")
 
 
 def _reserves(same: Sequence[View], design: Design, path: str, values: np.ndarray) -> np.ndarray:

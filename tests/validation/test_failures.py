@@ -241,29 +241,18 @@ def test_a_self_locking_drive_is_where_it_holds_before_a_failure() -> None:
 
 
 SLOT_CAR = """
-[design]
-name = "slot-car"
+design = {name = "slot-car"}
+gear = [{name = "crown", ratio = 3}]
+load = {inertia = "100 g*cm^2", path = "back-drivable", moment_max = "10 mN*m"}
+friction = {dry_torque = "0.5 mN*m"}
+encoder = {counts_per_rev = 48, speed = "difference", difference_samples = 4}
+limits = {voltage = "7.4 V"}
 [motor]
 constants = "dc"
 resistance = "1.3 ohm"
 inductance = "0.35 mH"
 torque_constant = "3.5 mN*m/A"
 rotor_inertia = "1.1 g*cm^2"
-[[gear]]
-name = "crown"
-ratio = 3
-[load]
-inertia = "100 g*cm^2"
-path = "back-drivable"
-moment_max = "10 mN*m"
-[friction]
-dry_torque = "0.5 mN*m"
-[encoder]
-counts_per_rev = 48
-speed = "difference"
-difference_samples = 4
-[limits]
-voltage = "7.4 V"
 [control]
 period = "1 ms"
 computing_delay = "0.2 ms"
