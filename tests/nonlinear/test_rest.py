@@ -11,7 +11,7 @@ from actuator_lti.design import Design, with_values
 from analyses.failures import Asked, failures
 from analyses.friction_effects import friction_effects
 from analyses.limit_cycles.run import limit_cycles
-from analyses.motion.settling import Settling, conduct, counted, ending_of, settle, words
+from analyses.motion.settling import NOTICED, Settling, conduct, counted, ending_of, settle, words
 from analyses.validation import validate
 from analyses.validation.settings import QUICK
 from nonlinear import Rows, State, commands, simulate
@@ -279,7 +279,7 @@ def ends_alike(design: Design, settlings: Iterable[Settling]) -> None:
             asked = (commands.step(one.amplitude_rad), ticks * tick_s, one.load_Nm)
             run = simulate(design, *asked, raise_on_failure=False)
             rest = None if run.running is None else judge(run.running)
-            verdict = "none" if rest is None else counted(rest, full).verdict
+            verdict = "none" if rest is None else counted(rest, NOTICED * full).verdict
             assert verdict == one.rest.verdict, (one, ticks)
 
 
