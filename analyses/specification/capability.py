@@ -211,8 +211,9 @@ def capability(design: Design, load_Nm: float, settling_s: float) -> Capability:
     settled = abs(float(speed[-1] - speed[-tail])) < 2e-3 * abs(steady)
     acceleration = _acceleration(design, load, direction, rate, push)
     drawn = abs(float(run.current_A[-tail:].mean())) if design.motor.has_electrical_dynamics else None
-    reached = {"simulated_rate_rad_s": steady, "simulated_current_A": drawn} if settled else {}
-    return replace(found, simulated_acceleration_rad_s2=acceleration, **reached)
+    if settled:
+        found = replace(found, simulated_rate_rad_s=steady, simulated_current_A=drawn)
+    return replace(found, simulated_acceleration_rad_s2=acceleration)
 
 
 def _acceleration(design: Design, load_Nm: float, direction: int, rate: float, push: float) -> float:
