@@ -29,7 +29,9 @@ class Statements(Expressions):
 
     def _block(self, nodes: list[ast.stmt]) -> None:
         for node in nodes:
-            self.whole = _evaluated(node)
+            # the expression that this statement itself evaluates, not those inside it
+            own = {ast.If: "test", ast.While: "test", ast.For: "iter"}.get(type(node), "value")
+            self.whole = getattr(node, own, None) or ast.Pass()
             self.translated(node)
 
     def _opened(self, head: str, nodes: list[ast.stmt]) -> None:
@@ -169,11 +171,10 @@ class Statements(Expressions):
         self.temporaries += 1
         return self.temporaries
 
-    def _Break(self, _node: ast.Break) -> None:
-        self._put("break;")
+    def _Break(self, node: ast.stmt) -> None:
+        self._put(f"{type(node).__name__.lower()};")
 
-    def _Continue(self, _node: ast.Continue) -> None:
-        self._put("continue;")
+    _Continue = _Break
 
     def _Pass(self, _node: ast.Pass) -> None:
         return
@@ -210,13 +211,6 @@ class Statements(Expressions):
 def result_type(function: Function) -> str:
     """Name of the structure that a function with several results returns."""
     return f"{function.c_name}_result"
-
-
-def _evaluated(node: ast.stmt) -> ast.AST:
-    """The expression that this statement itself evaluates, not those inside it."""
-    if isinstance(node, ast.If | ast.While):
-        return node.test
-    return node.iter if isinstance(node, ast.For) else getattr(node, "value", None) or ast.Pass()
 
 
 def overlap(targets: ast.Tuple, values: ast.Tuple) -> bool:

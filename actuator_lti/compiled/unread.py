@@ -13,7 +13,9 @@ def without_unread(
 ) -> dict[str, Leftover]:
     """The functions that the entries reach, without what none of them reads."""
     before = ""
-    while before != (text := _text(functions)):
+    while before != (
+        text := "".join(ast.unparse(each.tree) + ",".join(each.arguments) for each in functions.values())
+    ):
         before = text
         trees = [left.tree for left in functions.values()]
         nodes = (node for tree in trees for node in ast.walk(tree) if isinstance(node, ast.Subscript))
@@ -25,10 +27,6 @@ def without_unread(
             if name not in entries:
                 _narrow(functions, left)
     return functions
-
-
-def _text(functions: dict[str, Leftover]) -> str:
-    return "".join(ast.unparse(left.tree) + ",".join(left.arguments) for left in functions.values())
 
 
 def _owner(node: ast.Subscript, place: Place) -> object:

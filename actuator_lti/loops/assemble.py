@@ -86,8 +86,5 @@ def loops_at(
     )  # fmt: skip
 
 
-def _assembled_again(loops: Loops) -> Any:
-    return loops_at, (loops.design, loops.operating, loops.form, loops.inner_loops)
-
-
-copyreg.pickle(Loops, _assembled_again)  # sent to a worker as what it is made of
+# sent to a worker as what it is made of
+copyreg.pickle(Loops, lambda it: (loops_at, (it.design, it.operating, it.form, it.inner_loops)))

@@ -76,7 +76,8 @@ def delay_budget(
     bare, steps = _built_up(wired, loop_name, omega)
     kinds = (frozenset[str](), ALL - {"computing", "measurement"}, ALL - {"computing"}, ALL)
     ideal, held, measured, full = (_continuous(wired, loop_name, kind, omega) for kind in kinds)
-    sampled, later = (_sampled(each, loop_name, omega) for each in (wired, wired.later(wired.tick_s)))
+    systems = (loop(each, loop_name).plain_open for each in (wired, wired.later(wired.tick_s)))
+    sampled, later = (np.asarray(each(np.exp(1j * omega * each.dt))) for each in systems)
     controller = wired.law(loop_name).at_s(omega)
     controlled = float(np.degrees(np.angle(controller[-1])))
     behind = {"measurement": measured / held, "hold": held / ideal, "computing delay": full / measured}
@@ -94,7 +95,9 @@ def _built_up(wired: Drive, stage: str, omega: np.ndarray) -> tuple[np.ndarray, 
         return _continuous(wired, stage, frozenset(), omega), {}
     lag = encoder.filter_time_s
     names = [f"speed filter {1 / lag:.4g} rad/s"] if lag > 0 else []
-    names += [_name(k, item) for k, item in enumerate(velocity.filters, 1)]
+    for k, item in enumerate(velocity.filters, 1):
+        centre = centre_rad_s(item)
+        names.append(f"{item.on} {item.kind} {k}" + ("" if centre is None else f" {centre:.4g} rad/s"))
     steps: list[tuple[float, tuple[Filter, ...]]] = [(0.0, ())]
     if lag > 0:
         steps.append((lag, ()))
@@ -102,12 +105,6 @@ def _built_up(wired: Drive, stage: str, omega: np.ndarray) -> tuple[np.ndarray, 
     loops = [_continuous(_filtered(wired, *step), stage, frozenset(), omega) for step in steps]
     shares = [_from_low(after / before) for before, after in pairwise(loops)]
     return loops[0], dict(zip(names, shares, strict=True))
-
-
-def _name(k: int, item: Filter) -> str:
-    centre = centre_rad_s(item)
-    where = "" if centre is None else f" {centre:.4g} rad/s"
-    return f"{item.on} {item.kind} {k}{where}"
 
 
 def _filtered(wired: Drive, lag_s: float, filters: tuple[Filter, ...]) -> Drive:
@@ -120,11 +117,6 @@ def _filtered(wired: Drive, lag_s: float, filters: tuple[Filter, ...]) -> Drive:
 
 def _continuous(wired: Drive, stage: str, delays: frozenset[str], omega: np.ndarray) -> np.ndarray:
     return np.asarray(open_loop(wired, stage, delays)(1j * omega))
-
-
-def _sampled(wired: Drive, stage: str, omega: np.ndarray) -> np.ndarray:
-    system = loop(wired, stage).plain_open
-    return np.asarray(system(np.exp(1j * omega * system.dt)))
 
 
 def _from_low(values: np.ndarray) -> float:

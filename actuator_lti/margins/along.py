@@ -65,7 +65,12 @@ class Along:
     def reals(self) -> tuple[Crossing, ...]:
         """Those of the negative real axis, the ends among them."""
         turning = self.loop.period_s is None and self.loop.delay
-        ends = (0.0, self.ends[0]), (math.inf, 0j if turning else self._onto_axis())
+        end = self.ends[1]
+        if self.loop.delay:  # behind part of a sample L jumps to its conjugate, over the axis at their mean
+            # where it moves away from the axis before that, the crossing that goes with it lies below
+            towards = not turning and end.imag * (end * self.loop.rate_at_end()).imag < 0.0
+            end = complex(end.real) if towards and abs(end.real) > _ROUNDED * abs(end) else 0j
+        ends = (0.0, self.ends[0]), (math.inf, end)
         first, last = ([Crossing(w, L)] if -math.inf < L.real < 0.0 else [] for w, L in ends)
         return (*first, *_crossings(self.real_w, self.real_L), *last)
 
@@ -112,19 +117,6 @@ class Along:
         inside = [w for _, w in best if 0.0 < w < math.inf]
         L = dict(zip(inside, self.loop.at(np.array(inside)).tolist(), strict=True)) if inside else {}
         return [(d.at(L[w]) if w in L else value, w) for d, (value, w) in zip(distances, best, strict=True)]
-
-    def _onto_axis(self) -> complex:
-        """Where L lies on the real axis at the end; 0 where it does not come to it there.
-
-        Behind part of a sample L jumps at the Nyquist frequency to its conjugate, over the real axis at the
-        mean of both. Where L moves away from the axis before that, the crossing that goes with it lies below
-        and is listed.
-        """
-        end = self.ends[1]
-        if not self.loop.delay:
-            return end
-        towards = end.imag * (end * self.loop.rate_at_end()).imag < 0.0
-        return complex(end.real) if towards and abs(end.real) > _ROUNDED * abs(end) else 0j
 
     def _turned(self) -> int:
         """Turns of 1 + L about the origin from zero frequency to the end of the axis, in half turns."""

@@ -100,24 +100,15 @@ def _verdict(agreement: Agreement) -> Verdict:
 
 def delay_margins(phase_margins: tuple[PhaseMargin, ...], period_s: float | None) -> tuple[DelayMargin, ...]:
     """The delay that uses up each phase margin; a negative margin by way of a full turn."""
-    out = []
-    for margin in phase_margins:
-        lag = math.radians(margin.deg if margin.deg >= 0.0 else margin.deg + 360.0)
-        seconds = lag / margin.frequency_rad_s
-        samples = None if period_s is None else seconds / period_s
-        out.append(DelayMargin(seconds, samples, margin.frequency_rad_s))
-    return tuple(out)
+    lags = (math.radians(one.deg if one.deg >= 0.0 else one.deg + 360.0) for one in phase_margins)
+    pairs = [(lag / one.frequency_rad_s, one) for lag, one in zip(lags, phase_margins, strict=True)]
+    return tuple(DelayMargin(t, t / period_s if period_s else None, one.frequency_rad_s) for t, one in pairs)
 
 
 def _within(margins: StabilityMargins, low: float, high: float) -> StabilityMargins:
     """The same with only the margins of a band listed."""
-
-    def inside(listed: tuple[Any, ...]) -> tuple[Any, ...]:
-        return tuple(margin for margin in listed if low <= margin.frequency_rad_s <= high)
-
-    return replace(
-        margins,
-        gain_margins=inside(margins.gain_margins),
-        phase_margins=inside(margins.phase_margins),
-        delay_margins=inside(margins.delay_margins),
-    )
+    lists: dict[str, Any] = {
+        name: tuple(one for one in getattr(margins, name) if low <= one.frequency_rad_s <= high)
+        for name in ("gain_margins", "phase_margins", "delay_margins")
+    }
+    return replace(margins, **lists)

@@ -36,12 +36,23 @@ def checked_margins(
     factors = factored(late, poles)
     _trust_factors(loop, poles, factors)
     found = Along(factors, late, band_rad_s).polish()
-    _trust_crossings(loop, found)
+    at_ends = [w for w, L in zip((0.0, math.inf), found.ends, strict=True) if _LEAST <= abs(L) < math.inf]
+    if loop.coefficients is None and not loop.in_z:
+        at_ends = [w for w in at_ends if w < math.inf]  # the direct feed-through is an entry: exact
+    w = np.concatenate((found.gain_w, found.real_w, at_ends))
+    if not (error_bound(loop, loop.x(w)) <= MOST_ERROR).all():
+        raise Doubtful(f"rounding of the entries moves L at a crossing by more than {MOST_ERROR:g} of it")
     count = poles.unstable - found.half_turns
     second = _poles_behind_delay(late, found.gain_w) if closed is None else closed.unstable
     if second is not None and count != second:
         raise Doubtful("poles and Nyquist count disagree")
-    reason = _reason(found, second is not None, closed is not None)
+    residual = float(np.abs(found.real_L.imag / np.abs(found.real_L)).max(initial=1e-16))
+    stability = "stability by the Nyquist count alone" if second is None else "poles and Nyquist count agree"
+    reason = (
+        f"{stability}, intervals leave no crossing out, every gain margin puts a closed-loop "
+        f"pole on the stability boundary (residual {residual:.0e})"
+        + ("" if closed is None else ", no pole lies within its own error of it")
+    )
     return found.margins(Agreement(second, count), reason, delay_s)
 
 
@@ -84,16 +95,6 @@ def passed_into(loop: RationalLoop, gain_w: Real) -> int:
     return int((into * np.maximum(passed, 0.0)).sum())
 
 
-def _reason(found: Along, twice: bool, sure: bool) -> str:
-    residual = float(np.abs(found.real_L.imag / np.abs(found.real_L)).max(initial=1e-16))
-    stability = "poles and Nyquist count agree" if twice else "stability by the Nyquist count alone"
-    return (
-        f"{stability}, intervals leave no crossing out, every gain margin puts a closed-loop "
-        f"pole on the stability boundary (residual {residual:.0e})"
-        + (", no pole lies within its own error of it" if sure else "")
-    )
-
-
 def _trust_poles(loop: RationalLoop, poles: SortedPoles, closed: SortedPoles | None) -> None:
     """Poles that are clear of the border, but for exact ones at zero frequency."""
     if poles.doubtful or (closed is not None and (closed.border or closed.doubtful)):
@@ -116,13 +117,3 @@ def _trust_factors(loop: RationalLoop, poles: SortedPoles, factors: Factored) ->
     size = np.abs(roots[roots != 0.0])
     if size.size and float(size.max()) > _WIDEST * float(size.min()):
         raise Doubtful(f"poles and zeros are more than {_WIDEST:g} apart")
-
-
-def _trust_crossings(loop: RationalLoop, found: Along) -> None:
-    """The error bound of every crossing, and of the gain at both ends."""
-    at_ends = [w for w, L in zip((0.0, math.inf), found.ends, strict=True) if _LEAST <= abs(L) < math.inf]
-    if loop.coefficients is None and not loop.in_z:
-        at_ends = [w for w in at_ends if w < math.inf]  # the direct feed-through is an entry: exact
-    w = np.concatenate((found.gain_w, found.real_w, at_ends))
-    if not (error_bound(loop, loop.x(w)) <= MOST_ERROR).all():
-        raise Doubtful(f"rounding of the entries moves L at a crossing by more than {MOST_ERROR:g} of it")

@@ -32,9 +32,7 @@ def stability_margins(
     the exact polynomials where double precision does not place them. Stability is found twice where it can
     be, from closed-loop poles (behind a delay, from those without it) and from the Nyquist curve. Delays
     inside, and what double precision cannot check in this way, are worked out in exact arithmetic;
-    ``.evidence`` says how the answer is known. Quoted are, see `StabilityMargins` (printing it shows units):
-    the gain margin nearest to 0 dB, the phase margin nearest to 0 deg with its sign, the smallest delay
-    margin (0 for an unstable loop), the smallest distance to -1.
+    ``.evidence`` says how the answer is known; which figures are quoted, `StabilityMargins` says.
 
     ``system``: the open loop L, one input and one output, continuous or sampled: StateSpace,
     TransferFunction (of scipy.signal too), `DelaySystem` or FrequencyResponseData. With ``dt=True`` the

@@ -36,7 +36,7 @@ def polished(loop: RationalLoop, w: Real, gain: bool) -> tuple[Real, Complex]:
         L, slope = loop.response_and_slope(x)
         rate = loop.late_rate(x, slope / L)
         L = loop.late(x, L)
-        step = _newton_step(L, rate, gain)
+        step = np.log(np.abs(L)) / rate.real if gain else np.arctan2(-L.imag, -L.real) / rate.imag
         x = x - step
         far = np.where(np.abs(np.log(np.abs(L))) > _FAR, _FAR_ROUNDED, _ROUNDED)
         on_L, on_x = np.abs(step * rate), np.abs(step / x)
@@ -49,12 +49,6 @@ def polished(loop: RationalLoop, w: Real, gain: bool) -> tuple[Real, Complex]:
     if not (in_order and (np.abs(x - start) <= _FAR_OFF * start).all()):
         raise Doubtful("a crossing of the factors is none of the loop, or two are one")
     return (np.tan(0.5 * x) if loop.in_z else x), L
-
-
-def _newton_step(L: Complex, rate: Complex, gain: bool) -> Real:
-    if gain:
-        return np.asarray(np.log(np.abs(L)) / rate.real)
-    return np.asarray(np.arctan2(-L.imag, -L.real) / rate.imag)
 
 
 def factored(loop: RationalLoop, poles: SortedPoles | None = None) -> Factored:

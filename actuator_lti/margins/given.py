@@ -104,7 +104,8 @@ def given_of(system: Any) -> Given:
         )
     period_s = period_of(system)
     if hasattr(system, "num"):
-        num, den = _trimmed(system.num[0][0]), _trimmed(system.den[0][0])
+        parts = (np.asarray(part[0][0], dtype=float) for part in (system.num, system.den))
+        num, den = (np.trim_zeros(part, "f") for part in parts)
         if not den.size:
             raise InputError("the denominator of the loop is zero")
         if num.size > den.size:
@@ -120,12 +121,6 @@ def given_of(system: Any) -> Given:
     if not all(np.isfinite(getattr(given, name)).all() for name in given.entries):
         raise InputError("the loop holds a value that is not finite")
     return given
-
-
-def _trimmed(coefficients: Any) -> Real:
-    p = np.asarray(coefficients, dtype=float)
-    used = p.nonzero()[0]
-    return p[used[0] :] if used.size else p[:0]
 
 
 def unwarped(w: float, period_s: float | None) -> float:

@@ -23,17 +23,10 @@ Evidence = Literal["certified", "checked", "withheld"]
 class StabilityMargins:
     """All margins of a loop with negative unit feedback.
 
-    The figures to quote, and how they are chosen:
-
-    - ``gain_margin_db``: of all gain margins the one nearest to 0 dB, upper (> 0) or lower (< 0);
-      ``inf`` where there is none within 200 dB.
-    - ``phase_margin_deg``: of all phase margins the one nearest to 0 deg, with its sign; ``inf`` where the
-      gain never crosses one.
-    - ``delay_margin_s``: the smallest of all delay margins; ``inf`` where the gain never crosses one, and
-      0 for a loop that is not stable, which can take no delay.
-    - ``modulus_margin``: the smallest distance of L to -1, for a stable loop 1 over the peak of the
-      sensitivity.
-    - ``disk_margin``: balanced (S + T).
+    The figures to quote are its properties: of all gain margins the one nearest to 0 dB, upper (> 0) or
+    lower (< 0); of all phase margins the one nearest to 0 deg, with its sign; the smallest delay margin, 0 of
+    a loop that is not stable. ``modulus_margin`` is the smallest distance of L to -1, for a stable loop 1
+    over the peak of the sensitivity, ``disk_margin`` the balanced one (S + T).
 
     For an unstable loop the crossings are still listed: they say how far it is from the border, and their
     signs (a negative phase margin, a lower gain margin) say in which direction. Where stability is not

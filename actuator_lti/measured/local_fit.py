@@ -6,9 +6,10 @@ window in which both are least together is taken, point by point; the one that h
 among them. Points are taken as independent.
 """
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 from scipy.special import gammaincinv
 
 from actuator_lti.measured.bounds import CURVATURE, bend, unresolved_intervals
@@ -18,8 +19,7 @@ from actuator_lti.types import Complex, Ints, Mask, Real
 _LINEAR = 0.5  # of the size: noise up to this is the same in log L
 
 
-@dataclass(frozen=True)
-class _Fit:
+class _Fit(NamedTuple):
     """At each point: value, its radius and the half-width of the strip about it."""
 
     value: Complex
@@ -35,29 +35,16 @@ def averaged(omega: Real, L: Complex, radius: Real) -> tuple[Complex, Real]:
     u = np.log(omega)
     y = np.log(np.abs(L)) + 1j * np.unwrap(np.angle(L))
     apart = unresolved_intervals(L, radius) | (ratio[1:] >= _LINEAR) | (ratio[:-1] >= _LINEAR)
-    best = _Fit(y, ratio, ratio + _bends(u, y))
+    off = np.concatenate(([0.0], np.hypot(bend(u, y.real), bend(u, y.imag)), [0.0]))  # L from its chords
+    best = _Fit(y, ratio, ratio + np.maximum(off[:-1], off[1:]))
     half = 2
     while 2 * half < omega.size:
-        best = _better(best, _fitted(u, y, ratio, apart, half))
+        other = _fitted(u, y, ratio, apart, half)
+        best = _Fit(*(np.where(other.width < best.width, b, a) for a, b in zip(best, other, strict=True)))
         half *= 2
     value = np.exp(best.value)
     changed = best.value != y
     return np.where(changed, value, L), np.where(changed, best.radius * np.abs(value), radius)
-
-
-def _bends(u: Real, y: Complex) -> Real:
-    """How far L may lie off its chords beside each point."""
-    beside = np.concatenate(([0.0], np.hypot(bend(u, y.real), bend(u, y.imag)), [0.0]))
-    return np.maximum(beside[:-1], beside[1:])
-
-
-def _better(one: _Fit, other: _Fit) -> _Fit:
-    less = other.width < one.width
-    return _Fit(
-        np.where(less, other.value, one.value),
-        np.where(less, other.radius, one.radius),
-        np.where(less, other.width, one.width),
-    )
 
 
 def _fitted(u: Real, y: Complex, ratio: Real, apart: Mask, half: int) -> _Fit:
@@ -96,12 +83,14 @@ def _lines(u: Real, y: Complex, ratio: Real, apart: Mask, at: Ints, half: int) -
     curve = _dot(bow, values) / np.maximum(_dot(bow, bow), np.finfo(float).tiny)
     weight = _line_weights(x, there & (np.abs(offset) <= half // 2))
     rest = np.where(there, values - mean - slope * tilt - curve * bow, 0.0)
-    bent = 2.0 * _nearby(np.abs(curve[:, 0]))
+    bent = 2.0 * sliding_window_view(np.pad(np.abs(curve[:, 0]), 4), 9).max(axis=1)  # half a window around
     off = CURVATURE * bent * np.abs(_dot(weight, x**2)[:, 0]) / 2.0
     radius = np.sqrt((weight**2 * noise**2).sum(axis=1)) + off
     crossed = np.concatenate(([0], np.cumsum(apart)))
     torn = crossed[window[:, -1]] > crossed[window[:, 0]]
-    most = _largest(count[:, 0] - 3.0) * (noise**2).sum(axis=1) / count[:, 0]
+    # sum of squares of complex errors over the squared radius of one in 99 of 100: half a chi-square
+    most = gammaincinv(np.maximum(count[:, 0] - 3.0, 1.0), CONFIDENCE) / GAUSSIAN**2
+    most *= (noise**2).sum(axis=1) / count[:, 0]
     wrong = torn | ((np.abs(rest) ** 2).sum(axis=1) > most)
     return _dot(weight, values)[:, 0], np.where(wrong, np.inf, radius), bent
 
@@ -116,17 +105,3 @@ def _line_weights(x: Real, there: Mask) -> Real:
 
 def _dot(one: Real, other: Complex) -> Complex:
     return np.asarray((one * other).sum(axis=1, keepdims=True))
-
-
-def _nearby(bent: Real) -> Real:
-    """The largest in half a window on either side."""
-    padded = np.pad(bent, 4)
-    return np.asarray(np.max([padded[k : k + bent.size] for k in range(9)], axis=0))
-
-
-def _largest(freedom: Real) -> Real:
-    """Sum of squares of that many complex errors over the squared radius of one, in 99 of 100 cases.
-
-    Half a chi-square of twice the freedom.
-    """
-    return np.asarray(gammaincinv(np.maximum(freedom, 1.0), CONFIDENCE) / GAUSSIAN**2)

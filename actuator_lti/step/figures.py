@@ -56,10 +56,9 @@ class StepFigures(Compared):
 def step_figures(system: Any) -> StepFigures:
     """Figures of the unit step response of a stable system.
 
-    A rational system is taken exactly as its doubles say, as the free motion of its certified poles; all of
-    time is halved, so that nothing hides between two points of a grid. A sampled system is looked at at its
-    samples. A system with inner delays is walked along its first delays, and is then the free motion of its
-    exact poles. All figures are relative to the final value, however small it is beside what comes before.
+    A rational system is taken exactly as its doubles say, as the free motion of its certified poles, at all
+    times or at its samples; one with inner delays is walked along its first delays, and is then the free
+    motion of its exact poles. All figures are relative to the final value, however small that is.
 
     ``system``: a closed loop, one input, one output: StateSpace, TransferFunction (of
     scipy.signal too) or DelaySystem.
@@ -79,21 +78,14 @@ def step_figures(system: Any) -> StepFigures:
     if hasattr(system, "delays_s"):
         if (plain := plain_behind_delay(system)) is None:
             return _figures(*delayed_response(system))
-        system, late = plain
-        return _later(step_figures(system), late) if late else step_figures(system)
+        own, late = step_figures(plain[0]), plain[1]
+        return own if not late else replace(
+            own, settling_time_s=own.settling_time_s + late, peak_time_s=own.peak_time_s + late,
+            time_s=np.concatenate(([0.0, late], own.time_s + late)),
+            response=np.concatenate(([0.0, 0.0], own.response)),
+        )  # fmt: skip
     loop = rational_loop(system)
     return _figures(*rational_motion(system, loop), period_s=loop.period_s, notes=_notes(loop))
-
-
-def _later(figures: StepFigures, delay_s: float) -> StepFigures:
-    """Behind a delay in series."""
-    return replace(
-        figures,
-        settling_time_s=figures.settling_time_s + delay_s,
-        peak_time_s=figures.peak_time_s + delay_s,
-        time_s=np.concatenate(([0.0, delay_s], figures.time_s + delay_s)),
-        response=np.concatenate(([0.0, 0.0], figures.response)),
-    )
 
 
 def _figures(

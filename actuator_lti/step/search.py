@@ -48,16 +48,13 @@ class Search:
         self.see(np.concatenate((a, a + h)), np.concatenate((left, series.sum(axis=1))))
         for k in np.flatnonzero(self.worth(a, a + h, left - others, left + others)):
             if self.worth(a[k], a[k] + h[k], left[k] - others[k], left[k] + others[k]):
-                self._within(a[k], h[k], np.poly1d(series[k]))
-
-    def _within(self, a: float, h: float, e: np.poly1d) -> None:
-        ten, ninety, over, under = (
-            a + h * np.array(_zeros(e - level)) for level in (_TEN, _NINETY, _BAND, -_BAND)
-        )
-        self.ten, self.ninety = ten.min(initial=self.ten), ninety.min(initial=self.ninety)
-        self.last = np.concatenate((over, under)).max(initial=self.last)
-        turns = np.array(_zeros(e.deriv()))
-        self.see(a + h * turns, e(turns))
+                e = np.poly1d(series[k])
+                of = (e - _TEN, e - _NINETY, e - _BAND, e + _BAND, e.deriv())
+                ten, ninety, over, under, turns = (np.array(_zeros(each)) for each in of)
+                self.ten = (a[k] + h[k] * ten).min(initial=self.ten)
+                self.ninety = (a[k] + h[k] * ninety).min(initial=self.ninety)
+                self.last = (a[k] + h[k] * np.append(over, under)).max(initial=self.last)
+                self.see(a[k] + h[k] * turns, e(turns))
 
 
 def _zeros(f: np.poly1d) -> list[float]:

@@ -27,7 +27,7 @@ from actuator_lti.margins.loop import rational_loop
 from actuator_lti.systems.control_face import ControlFace
 from actuator_lti.systems.plain_system import PlainDelaySystem, descriptor, in_parallel, in_series, response
 
-_PARTS = ("A", "B1", "B2", "C1", "C2", "D11", "D12", "D21", "D22", "delays_s")
+_PARTS = (*PlainDelaySystem.parts, "delays_s")
 
 
 def _matrix(value: Any, rows: int, columns: int, name: str) -> np.ndarray:

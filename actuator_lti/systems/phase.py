@@ -95,8 +95,12 @@ def _rational_phase(given: Given, w: Real) -> Real:
     loop = loop_of(given, warp=True)
     try:
         factors = factored(loop)
-    except Doubtful:
-        factors = _exact_factors(given)
+    except Doubtful:  # from the roots of the exact polynomials, but for their constant
+        exact = exact_loop(given)
+        above, below = (np.array(part.values, dtype=complex) for part in (exact.zeros, exact.poles))
+        roots, weights = np.append(above, below), np.append(np.ones(above.size), -np.ones(below.size))
+        roots.real[np.abs(roots.real) < _ON_AXIS * np.abs(roots.imag)] = 0.0
+        factors = Factored(roots, weights, 0.0)
     size = np.abs(factors.roots)
     at_rest = size <= _AT_REST * np.median(size) if size.size else size > 0.0
     first = 1e-3 * float(size[~at_rest].min(initial=1.0))
@@ -116,12 +120,3 @@ def _sign(loop: RationalLoop, factors: Factored) -> float:
     with np.errstate(divide="ignore", invalid="ignore"):
         k = int(np.nan_to_num(np.abs(np.log(np.abs(L))), nan=np.inf).argmin())
     return half_turn(float(np.angle(L[k]) - factors.log_value(w[k : k + 1])[1][0]))
-
-
-def _exact_factors(given: Given) -> Factored:
-    """From the roots of the exact polynomials, but for their constant."""
-    loop = exact_loop(given)
-    above, below = (np.array(part.values, dtype=complex) for part in (loop.zeros, loop.poles))
-    roots, weights = np.append(above, below), np.append(np.ones(above.size), -np.ones(below.size))
-    roots.real[np.abs(roots.real) < _ON_AXIS * np.abs(roots.imag)] = 0.0
-    return Factored(roots, weights, 0.0)

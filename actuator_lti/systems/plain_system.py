@@ -2,7 +2,7 @@
 
 The equations of the latter are those of `actuator_lti.systems.delay_system`, whose python-control systems
 are made of these; how two systems are joined and how one is evaluated stands here alone. The python-control
-system of a plain one is made where somebody asks for it (`as_control.py`): importing python-control takes a
+system of a plain one is made where somebody asks for it (`as_control`): importing python-control takes a
 second, and margins, bandwidths and steps do not need it.
 """
 
@@ -13,6 +13,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 import numpy.typing as npt
+from scipy.linalg import block_diag
 
 from actuator_lti.errors import InputError
 from actuator_lti.systems.resolvent import responses, solved_at
@@ -58,6 +59,7 @@ class PlainDelaySystem:
     """
 
     dt: ClassVar[float] = 0.0
+    parts: ClassVar[tuple[str, ...]] = ("A", "B1", "B2", "C1", "C2", "D11", "D12", "D21", "D22")
 
     A: np.ndarray  # shapes (n,n), (n,m), (n,k), (p,n), (k,n), (p,m), (p,k), (k,m), (k,k)
     B1: np.ndarray
@@ -75,7 +77,7 @@ class PlainDelaySystem:
     signal: str = "y"
 
     def __post_init__(self) -> None:
-        for part in ("A", "B1", "B2", "C1", "C2", "D11", "D12", "D21", "D22"):
+        for part in self.parts:
             if not np.isfinite(getattr(self, part)).all():
                 raise InputError(f"{part}: every entry must be finite")
 
@@ -149,10 +151,8 @@ def joined_by(
     a: PlainDelaySystem, b: PlainDelaySystem, source: np.ndarray, sink: np.ndarray, loop: np.ndarray
 ) -> PlainDelaySystem:
     """Both systems side by side, their inputs ``e = source u + loop y``, the output ``sink y``."""
-    A, B1, B2 = _block(a.A, b.A), _block(a.B1, b.B1), _block(a.B2, b.B2)
-    C1, C2 = _block(a.C1, b.C1), _block(a.C2, b.C2)
-    D11, D12 = _block(a.D11, b.D11), _block(a.D12, b.D12)
-    D21, D22 = _block(a.D21, b.D21), _block(a.D22, b.D22)
+    both = (block_diag(getattr(a, part), getattr(b, part)) for part in a.parts)
+    A, B1, B2, C1, C2, D11, D12, D21, D22 = both
     algebra = np.eye(D11.shape[0]) - D11 @ loop
     if np.linalg.cond(algebra) > _ALGEBRAIC:
         raise InputError("feedback: an algebraic loop without a solution (1 + L(infinity) = 0)")
@@ -200,7 +200,21 @@ def response(system: Any, points: np.ndarray) -> np.ndarray:
     return np.asarray(np.moveaxis(y, 0, -1))
 
 
-def _block(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    out = np.zeros((a.shape[0] + b.shape[0], a.shape[1] + b.shape[1]))
-    out[: a.shape[0], : a.shape[1]], out[a.shape[0] :, a.shape[1] :] = a, b
-    return out
+def as_control(system: Any) -> Any:
+    """The named python-control system of a plain one; anything else as it is.
+
+    With exact delays it is an `actuator_lti.systems.delay_system.DelaySystem`, without a
+    `control.StateSpace`.
+    """
+    if not isinstance(system, PlainDelaySystem | PlainSystem):
+        return system
+    names: Any = {"inputs": [system.source], "outputs": [system.signal], "name": system.name}
+    if isinstance(system, PlainDelaySystem):
+        from actuator_lti.systems.delay_system import DelaySystem
+
+        return DelaySystem.of(system, **names)
+    import control
+
+    more = {"states": [state.replace(".", "_") for state in system.states]} if system.states else {}
+    parts = (system.A, system.B, system.C, system.D, system.dt)
+    return control.ss(*parts, remove_useless_states=False, **names, **more)

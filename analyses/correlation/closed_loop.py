@@ -183,7 +183,29 @@ def _nearest(
 ) -> _Modelled:
     """The reading of a command with which a run is nearest, that run and its signals."""
     readings = driving.readings(driving.needed_command(design, record, command), record)
-    driven = readings[0]
+    told: list[list[str]] = [list(notes) for _ in readings]
+    tried = [_run_so(one, record, measured, own, progress) for one, own in zip(readings, told, strict=True)]
+    best = min(range(len(tried)), key=lambda k: _unlikely(tried[k], measured))
+    notes[:] = told[best]
+    return tried[best]
+
+
+def _unlikely(tried: _Modelled, measured: Mapping[str, Floats]) -> float:
+    """How far a reading is from the record: one that finds more times has to be nearer (Schwarz, 1978)."""
+    driven, _, series = tried
+    rows = len(next(iter(measured.values())))
+    misfit = np.log(max(_off(measured, series), 1e-300))
+    return float(rows * len(measured) * misfit + len(driven.first) * np.log(rows))
+
+
+def _run_so(
+    driven: driving.Driven,
+    record: Record,
+    measured: Mapping[str, Floats],
+    notes: list[str],
+    progress: Progress = None,
+) -> _Modelled:
+    """The run of one reading and its signals, from the state in which the record begins."""
     notes.extend(driven.notes)
     time, even = record.time_s - record.time_s[0], period_of(record) * np.arange(len(record))
     if (np.abs(time - even) <= 4.0 * np.spacing(np.abs(record.time_s).max())).all():
@@ -196,9 +218,7 @@ def _nearest(
     duration = float(time[-1]) + 2.0 * period
     initial, moving = driving.first_states(driven, record, measured)
 
-    def run(
-        driven: driving.Driven, early_s: Floats, *, until: float = duration, at: State = initial, **more: Any
-    ) -> Trajectory:
+    def run(early_s: Floats, *, until: float = duration, at: State = initial, **more: Any) -> Trajectory:
         wanted = commands.sampled(*driving.at_ticks(driven, time, duration, early_s), where=record.name)
         return simulate(model, wanted, until, load, initial=at, **supply, **more)
 
@@ -206,17 +226,13 @@ def _nearest(
         part = {name: values[:FIRST_ROWS] for name, values in measured.items()}
         until = float(time[:FIRST_ROWS][-1]) + 2.0 * period
         early = driven.likely_s
-        rest, goes = (
-            signals_at(model, run(driven, early, until=until, at=at), time) for at in (initial, moving)
-        )
+        rest, goes = (signals_at(model, run(early, until=until, at=at), time) for at in (initial, moving))
         if _off(part, goes) < _off(part, rest):
             initial = moving
             notes.append("the record begins in motion or under load, and so does the model")
-    whole = partial(run, at=initial, progress=progress)
-    tried = [_with_steps(one, time, measured, partial(whole, one)) for one in readings]
-    best = min(tried, key=lambda each: _off(measured, each[2]))
-    notes.append(f"model: {len(best[1].time_s)} ticks of {period * 1e6:g} us, command {best[0].between}")
-    return best
+    made = _with_steps(driven, time, measured, partial(run, at=initial, progress=progress))
+    notes.append(f"model: {len(made[1].time_s)} ticks of {period * 1e6:g} us, command {made[0].between}")
+    return made
 
 
 def _off(measured: Mapping[str, Floats], modelled: Mapping[str, Floats]) -> float:

@@ -14,7 +14,6 @@ from actuator_lti.design.model import Design
 from actuator_lti.drive.steady import steady_voltage_V
 from actuator_lti.errors import InputError
 from actuator_lti.types import Floats, Ints
-from analyses.estimation.least_squares import scaled_lstsq
 from analyses.records.holds import Hold, hold_of
 from analyses.records.naming import LOADS
 from analyses.records.record import HELD, SMOOTH, STRAIGHT, Record
@@ -59,6 +58,12 @@ class Driven:
         return steps_at(self.values, self.together)
 
     @property
+    def first(self) -> Ints:
+        """The first of the steps that come as much before their rows: neighbours, or all of one hold."""
+        rows = len(self.values)
+        return np.flatnonzero(np.diff(self.steps, prepend=-rows - 1) > (1 if self.hold is None else rows))
+
+    @property
     def likely_s(self) -> Floats:
         """By how much each step comes before its row: as known, or where that is looked for from."""
         if self.early_s is not None:
@@ -70,31 +75,36 @@ def readings(driven: Driven, record: Record) -> list[Driven]:
     """How a command may go on between its samples where the drive's ticks are more; as the record has it.
 
     Jumps in neighbouring rows are a curve or steps; a curve is smooth, or the drive takes it in straight
-    lines or, as from a field bus, held until the next sample. Where the rows tell when it is held, it is.
+    lines or, as from a field bus, held until the next sample. Where the rows tell a grid on which it jumps,
+    it is held, and each jump on the grid or, as of a sender that is not punctual, anywhere before its row.
     """
-    if (told := _held(driven, record)) is not None:
-        return [told]
+    early = record.early_s
+    held = replace(driven, together=len(record), between=HELD)
+    if (on_grid := _on_grid(held, record)) is not None:
+        found = [on_grid, held]
+        if early is None:
+            return found
+        found = [replace(one, early_s=early[on_grid.steps]) for one in found]
+        return found[:1] if on_grid.hold and on_grid.hold.holds(found[0].likely_s) else found[1:]
     found = [driven, replace(driven, together=MOST_TOGETHER)]
     if record.period_s > 1.5 * driven.design.controller.period_s:
-        found.append(replace(driven, together=len(record), between=HELD))
-        found.append(replace(driven, together=0, between=STRAIGHT))
+        found += [held, replace(driven, together=0, between=STRAIGHT)]
     other = [one for k, one in enumerate(found) if not k or len(one.steps) != len(found[k - 1].steps)]
-    if (early := record.early_s) is not None:
+    if early is not None:
         known = [one for one in other if np.array_equal(one.steps, np.flatnonzero(~np.isnan(early)))]
         other = [replace(one, early_s=early[one.steps]) for one in known]
     return [one for one in other if record.between in ("", one.between)] or [driven]
 
 
-def _held(driven: Driven, record: Record) -> Driven | None:
+def _on_grid(held: Driven, record: Record) -> Driven | None:
     """A command that is held, with the tick that the rows tell by its steps; None where they tell none."""
-    held, control = replace(driven, together=len(record), between=HELD), driven.design.controller
+    control = held.design.controller
     row_s = float(record.time_s[-1] - record.time_s[0]) / max(len(record) - 1, 1)
     hold = hold_of(held.steps, len(record), row_s, control.period_s)
     if hold is None:
         return None
-    early = None if record.early_s is None else record.early_s[hold.rows]
-    design = replace(driven.design, controller=replace(control, period_s=hold.tick_s))
-    return replace(held, design=design, hold=hold, early_s=early)
+    design = replace(held.design, controller=replace(control, period_s=hold.tick_s))
+    return replace(held, design=design, hold=hold)
 
 
 def command_names(design: Design) -> dict[str, str]:
@@ -207,16 +217,24 @@ def earlier_s(driven: Driven, time_s: Floats, measured: Floats, modelled: Floats
     gains, the inertia, the clock) stands beside them, so that it is not taken for a time. Steps in
     neighbouring rows, or of one hold, come as much earlier, by what answers all of them.
     """
-    rate, off, steps = np.gradient(modelled, time_s), measured - modelled, driven.steps
-    first = np.flatnonzero(np.diff(steps, prepend=-1) > 1) if driven.hold is None else np.zeros(1, np.int64)
-    later = steps[first]
-    table, rest = np.zeros((len(time_s), len(later) + 1)), np.zeros(len(time_s))
-    for k, (start, end) in enumerate(zip(later, [*later[1:], len(time_s)], strict=True)):
-        part, before = slice(start, end), start - 1
-        table[part, k] = moved = rate[part] - rate[before]
-        table[part, -1] = (time_s[part] - time_s[before]) * moved
-        rest[part] = off[part] - off[before]
-    return np.repeat(scaled_lstsq(table, rest)[:-1], np.diff(first, append=len(steps)))
+    rate, off = np.gradient(modelled, time_s), measured - modelled
+    steps, first = driven.steps, driven.first
+    begins = steps[first]
+    at = np.repeat(np.arange(len(begins)), np.diff(begins, append=len(time_s)))  # the step before each row
+    rows, before, starts = slice(begins[0], None), begins[at] - 1, begins - begins[0]
+    moved, left = rate[rows] - rate[before], off[rows] - off[before]
+    stretched = (time_s[rows] - time_s[before]) * moved
+    sizes = np.add.reduceat(moved**2, starts)
+
+    def shares(values: Floats) -> Floats:
+        """How much of the motion after each step is in some values."""
+        inside = np.add.reduceat(moved * values, starts)
+        return np.divide(inside, sizes, np.zeros(len(begins)), where=sizes > 0.0)
+
+    alone = stretched - shares(stretched)[at] * moved  # what no times make of a stretch
+    if np.linalg.norm(alone) > len(alone) * np.finfo(float).eps * np.linalg.norm(stretched):
+        left = left - float(alone @ left / (alone @ alone)) * stretched
+    return np.repeat(shares(left), np.diff(first, append=len(steps)))
 
 
 def supply_of(driven: Driven, record: Record, time_s: Floats, notes: list[str]) -> dict[str, Any]:

@@ -77,9 +77,10 @@ def plan_motions(
 
     The next one is that which lowers the sum of the squared intervals, each over what was asked, most
     (A-optimal). Intervals follow from the rows that a fit makes of the simulated motion, and from noise
-    that went the same way: the covariance is the fit's own. ``within`` is half of each 95 % interval, over
-    the value; ``noise`` is white, of the recorded current (V: voltage, of a drive without one) at 1 kHz,
-    rms; ``measured`` is what records tell that are there already.
+    that went the same way: the covariance is the fit's own, for a drive of the design's friction law (a
+    bend that is too small to be sure widens what records then state). ``within`` is half of each 95 %
+    interval, over the value; ``noise`` is white, of the recorded current (V: voltage, of a drive without
+    one) at 1 kHz, rms; ``measured`` is what records tell that are there already.
     """
     if design.controller.position is None:
         raise InputError("a plan of motions needs a position loop", where=design.name)

@@ -114,7 +114,7 @@ def motion_of(design: Design, record: Record, recipe: Recipe) -> tuple[Motion, s
 def stands(design: Design, record: Record, recipe: Recipe | None = None) -> bool:
     """Whether a record shows no motion: noise that is white, or that nothing of the drive's torque moves."""
     place, rate = place_of(design, record), RATES[design.axis]
-    if _too_short(record) or (place is None and rate not in record.signals):
+    if too_short(record) or (place is None and rate not in record.signals):
         return False  # it is refused for that
     if place is None:
         values = record[rate]
@@ -292,12 +292,13 @@ def _kept(record: Record, motion: Motion, part: slice, recipe: Recipe) -> Mask:
     return apart[(len(apart) - 1) % recipe.decimation :: recipe.decimation]
 
 
-def _too_short(record: Record) -> bool:
+def too_short(record: Record) -> bool:
+    """Whether a record is refused for how long it lasts."""
     return len(record) * period_of(record) < SHORTEST_S and not is_benchmark(record)
 
 
 def _check(record: Record, locked: bool) -> None:
-    if _too_short(record):
+    if too_short(record):
         lasts = len(record) * period_of(record)
         told = f"lasts {lasts:.3g} s in {len(record)} rows: {SHORTEST_S:g} s and more are needed"
         raise InputError(f"{told}; is the unit of the time right?", where=record.name)

@@ -27,6 +27,7 @@ from analyses.identification.rows import (
     recipe_for,
     record_rows,
     stands,
+    too_short,
 )
 from analyses.records.consistency import NO_CHANCE, SURE, place_of
 from analyses.records.naming import RATES
@@ -45,7 +46,9 @@ def runs_down(design: Design, record: Record) -> bool:
 
 def switched_off(design: Design, record: Record) -> Record:
     """The record; of a motion whose current is white noise that moves nothing (F-test), with none."""
-    if not np.any(current := record.signals.get("current", np.zeros(1))) or stands(design, record):
+    if not np.any(current := record.signals.get("current", np.zeros(1))):
+        return record
+    if too_short(record) or stands(design, record):
         return record
     recipe = recipe_for(record)
     motion = motion_of(design, record, recipe)[0]

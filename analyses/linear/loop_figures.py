@@ -27,7 +27,7 @@ from actuator_lti.loops.assemble import loops_at
 from actuator_lti.loops.commanded import commanded_bandwidth, commanded_step
 from actuator_lti.margins import StabilityMargins, stability_margins
 from actuator_lti.step import StepFigures, step_figures
-from actuator_lti.systems.as_control import as_control
+from actuator_lti.systems.plain_system import as_control
 from analyses.isolation import attempt
 
 HELD = {"current": "rotor locked", "velocity": "load moment held"}
@@ -149,7 +149,11 @@ def _answering(
                 "the response at zero frequency is less than 1e-5 of its largest value: there is nothing to "
                 "measure the fall and the resonance from"
             )
-        notes.extend(_far_from_asked(figures.loop.name, abs(own.dc_gain)))
+        if not sqrt(0.5) < abs(own.dc_gain) < sqrt(2.0):  # by 3 dB or more, beyond what a bandwidth lets pass
+            notes.append(
+                f"{figures.loop.name} loop: a constant command gives {abs(own.dc_gain):.4g} of it; -3 dB and "
+                "overshoot are relative to that and do not say how fast the loop is: its gain crossover does"
+            )
         return own if mean is None else commanded_bandwidth(response, mean)
 
     def steps() -> StepFigures:
@@ -160,16 +164,6 @@ def _answering(
         figures, plain_response=response, bandwidth=_if_there_is(band, notes) if bandwidth else None,
         step=_if_there_is(steps, notes) if step else None, notes=tuple(dict.fromkeys(notes)), mean=mean,
     )  # fmt: skip
-
-
-def _far_from_asked(name: str, dc_gain: float) -> list[str]:
-    """A note where a constant command is followed 3 dB or more off, beyond what a bandwidth lets pass."""
-    if sqrt(0.5) < dc_gain < sqrt(2.0):
-        return []
-    return [
-        f"{name} loop: a constant command gives {dc_gain:.4g} of it; -3 dB and overshoot are relative to "
-        "that and do not say how fast the loop is: its gain crossover does"
-    ]
 
 
 def _if_there_is(call: Callable[[], Figure], notes: list[str]) -> Figure | None:

@@ -134,7 +134,11 @@ def survey_loops(design: AnyDesign, progress: Progress = None) -> LoopSurvey:
         other = attempt(f"{form} form", partial(_other_form, design, form, refused), None)
         forms |= {} if other is None else {form: other}
     step(2)
-    break_points = attempt("loops at the break points", lambda: _break_points(loops), {})
+    break_points: dict[str, BreakPoint] = attempt(
+        "loops at the break points",
+        lambda: {name: _break_point(loops, name) for name in loops.break_points},
+        {},
+    )
     step(3)
     points = attempt("loops at the operating points", lambda: operating_points(design, refused), ())
     step(4)
@@ -148,10 +152,6 @@ def survey_loops(design: AnyDesign, progress: Progress = None) -> LoopSurvey:
 
 def _other_form(design: Design, form: Form, refused: list[str]) -> Mapping[str, LoopFigures]:
     return all_loop_figures(assemble_loops(design, form=form), step=False, refused=refused, certify=True)
-
-
-def _break_points(loops: Loops) -> dict[str, BreakPoint]:
-    return {name: _break_point(loops, name) for name in loops.break_points}
 
 
 def _break_point(loops: Loops, name: str) -> BreakPoint:

@@ -154,14 +154,16 @@ def _is_matrix(value: Any) -> bool:
     return isinstance(value, list) and all(map(_is_list, value)) and len({len(row) for row in value}) == 1
 
 
-def _is_time(value: Any) -> bool:
-    return value is None or (_is_number(value) and 0.0 <= value < 1e6)
-
-
 _KEYS: dict[str, tuple[str, Callable[[Any], bool]]] = {
     **dict.fromkeys(COEFFICIENTS, ("a list of numbers, all finite", _is_list)),
     **dict.fromkeys(MATRICES, ("a list of rows of as many numbers each, all finite", _is_matrix)),
-    **dict.fromkeys(_TIMES, ("a time in s, at least 0", _is_time)),
+    **dict.fromkeys(
+        _TIMES,
+        (
+            "a time in s, at least 0",
+            lambda value: value is None or (_is_number(value) and 0.0 <= value < 1e6),
+        ),
+    ),
     **dict.fromkeys(_WORDS, ("a text", lambda value: isinstance(value, str) and bool(value.strip()))),
     "sign": ("-1 (negative feedback) or 1", lambda value: _is_number(value) and value in (-1, 1)),
 }

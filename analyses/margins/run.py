@@ -11,7 +11,7 @@ from actuator_lti.design.loader import AnyDesign, as_design
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
 from actuator_lti.files.response import Loop as Kind
-from actuator_lti.files.response import RecordedResponse, read_response
+from actuator_lti.files.response import read_response
 from actuator_lti.loops import Loops, assemble_loops
 from actuator_lti.margins import StabilityMargins, stability_margins
 from actuator_lti.measured.response import MeasuredResponse
@@ -126,8 +126,10 @@ def measured_over(loops: Loops, source: Any, place: str = "", averages: int | No
     omega, values = 2.0 * np.pi * read.frequency_hz[below], read.response[below]
     points = 1j * omega if loop.period_s is None else np.exp(1j * omega * loop.period_s)
     read = replace(read, response=values, deviation=read.deviation[below], radius=read.radius[below])
-    found = _with_spread(omega, read, loop.period_s)
     size = np.abs(values)
+    found = MeasuredResponse(omega, values, size * read.radius, loop.period_s, read.noise)
+    if not np.isfinite(found.radius).all():  # not known: as the points scatter about their neighbours
+        found = MeasuredResponse.from_scatter(found)
     spread_of = np.divide(found.radius, size, out=np.zeros(omega.size), where=size > 0.0)
     opened = replace(read, radius=spread_of).as_loop(cast("Kind", of))
     size = np.abs(opened.response)  # where it is 0 a circle says nothing
@@ -154,13 +156,6 @@ def measured_over(loops: Loops, source: Any, place: str = "", averages: int | No
 def _closed(L: np.ndarray) -> dict[str, np.ndarray]:
     """What may be measured of a loop, of its open loop: that, T and S."""
     return {"L": L, "T": L / (1.0 + L), "S": 1.0 / (1.0 + L)}
-
-
-def _with_spread(omega: Floats, read: RecordedResponse, period_s: float | None) -> MeasuredResponse:
-    """What was measured with its noise: as it is known, else as the points scatter about their neighbours."""
-    radius = np.abs(read.response) * read.radius
-    data = MeasuredResponse(omega, read.response, radius, period_s, read.noise)
-    return data if np.isfinite(radius).all() else MeasuredResponse.from_scatter(data)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -38,6 +38,11 @@ class Hold:
         """When the first jump comes, by how much each is before its row."""
         return float(self.row_s * self.rows[0] - early_s[0])
 
+    def holds(self, early_s: Floats) -> bool:
+        """Whether all jumps are on the grid, by how much each is before its row."""
+        off = early_s - self.early_s(self.first_s(early_s))
+        return bool(np.all(np.abs(off) < ON_TICKS * self.tick_s))
+
     def ahead_s(self, early_s: Floats) -> float:
         """How long before the first row the drive has its first tick: all jumps are at one."""
         ticks = -self.first_s(early_s) / self.tick_s

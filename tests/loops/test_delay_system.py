@@ -31,18 +31,11 @@ def test_series_parallel_feedback_are_exact() -> None:
     b = DelaySystem.delay(0.005) * LEAD
     A, B = lag(S) * np.exp(-0.02 * S), (0.3 * S + 1) / (0.01 * S + 1) * np.exp(-0.005 * S)
     for system, expected in (
-        (a * b, A * B),
-        (a + b, A + B),
-        (a - 3, A - 3),
-        (1 - a, 1 - A),
-        (-a, -A),
-        (2 * a / 4, A / 2),
-        (LAG * a, lag(S) * A),
-        (a.feedback(), A / (1 + A)),
-        (a.feedback(b), A / (1 + A * B)),
+        (a * b, A * B), (a + b, A + B), (a - 3, A - 3), (1 - a, 1 - A), (-a, -A), (2 * a / 4, A / 2),
+        (LAG * a, lag(S) * A), (a.feedback(), A / (1 + A)), (a.feedback(b), A / (1 + A * B)),
         (a.feedback(b, sign=1), A / (1 - A * B)),
         (b.feedback(a.feedback(LAG)), B / (1 + B * A / (1 + A * lag(S)))),
-    ):
+    ):  # fmt: skip
         np.testing.assert_allclose(system(S), expected, rtol=1e-11)
 
 
@@ -80,17 +73,12 @@ def test_poles_and_zeros_are_given_only_without_delay() -> None:
 def test_infinite_and_finite_dc_gain() -> None:
     delayed = DelaySystem.from_system(LAG) * DelaySystem.delay(0.1)
     assert delayed.dcgain() == pytest.approx(2)
+    assert [np.shape(delayed(at)) for at in (1j, np.array([1j, 2j]))] == [(), (2,)]
+    assert delayed([1j, 2j], squeeze=False).shape == (1, 1, 2)
     integrator = DelaySystem.from_system(control.tf([1], [1, 0])) * DelaySystem.delay(0.1)
     assert np.isinf(integrator(0).real)
     # an open integrator inside a closed loop is no pole of it
     assert integrator.feedback()(0) == pytest.approx(1)
-
-
-def test_shapes_follow_python_control() -> None:
-    system = DelaySystem.from_system(LAG) * DelaySystem.delay(0.1)
-    assert np.ndim(system(1j)) == 0
-    assert system(np.array([1j, 2j])).shape == (2,)
-    assert system([1j, 2j], squeeze=False).shape == (1, 1, 2)
 
 
 def test_refusals() -> None:

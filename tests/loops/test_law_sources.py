@@ -13,7 +13,7 @@ from scipy.sparse import csc_matrix
 from test_own_law import refused
 
 from actuator_lti import load_design
-from actuator_lti.design import Design, write_design
+from actuator_lti.design import Design, read_design_text, write_design
 from actuator_lti.design.law import Law
 from actuator_lti.files.mat5 import read_mat5
 
@@ -26,6 +26,7 @@ L = np.array([0.25, -0.5])
 INPUTS = ["error", "speed"]
 WANTED = BASE.with_law("velocity", (A, B, C, D, T), INPUTS, L=L).controller
 PARTS = {"A": A, "B": B, "C": C, "D": D, "Ts": T}
+LISTS = {key: np.asarray(value).tolist() for key, value in PARTS.items()}
 
 
 def read(folder: Path, held: Any, beside: str = "") -> Design:
@@ -51,14 +52,16 @@ NAMES = f"inputs = {INPUTS}"
     (PARTS | {"L": L, "A": csc_matrix(A), "B": csc_matrix(B), "D": csc_matrix(D)}, NAMES),
     (PARTS | {"L": L + 0j, "A": csc_matrix(A + 0j)}, NAMES),
     ({"K": PARTS | {"L": L, "inputs": np.array(INPUTS, dtype=object)}}, NAMES),
+    (json.dumps(LISTS | {"L": L.tolist(), "dt": T}), NAMES),
 ])  # fmt: skip
 def test_all_that_a_file_holds_is_taken(held: Any, beside: str, tmp_path: Path) -> None:
-    assert read(tmp_path, held, beside).controller == WANTED
+    found = read(tmp_path, held, beside)
+    assert found.controller == WANTED
+    assert read_design_text(write_design(found)).controller == WANTED
 
 
 def test_an_unknown_key_is_named_where_a_law_is_all_that_is_held(tmp_path: Path) -> None:
-    one = {key: np.asarray(value).tolist() for key, value in PARTS.items()}
-    for held in (json.dumps({**one, "gains": 2}), json.dumps({"K": {**one, "gains": 2}})):
+    for held in (json.dumps({**LISTS, "gains": 2}), json.dumps({"K": {**LISTS, "gains": 2}})):
         said = refused(read, tmp_path, held, NAMES)
         assert 'k.json": "gains": unknown key (nearest known: "gain"); allowed: a file of one law' in said
     assert '"l", "state"' in refused(read, tmp_path, {"K": PARTS | {"l": L, "state": 1.0}}, NAMES)
@@ -121,13 +124,12 @@ def test_json_text_and_truth_are_no_numbers(value: str, tmp_path: Path) -> None:
 
 
 def test_what_a_file_leaves_open_is_refused(tmp_path: Path) -> None:
-    one = {key: np.asarray(value).tolist() for key, value in PARTS.items()}
     several = refused(read, tmp_path, {"K1": PARTS, "K2": PARTS}, NAMES)
     assert "holds several laws: K1, K2; allowed: a file of one law" in several
     assert "several laws: its own A, B, C, D, K" in refused(
-        read, tmp_path, json.dumps({**one, "K": one}), NAMES
+        read, tmp_path, json.dumps({**LISTS, "K": LISTS}), NAMES
     )
-    assert "has Ts and dt that differ" in refused(read, tmp_path, json.dumps({**one, "dt": 1.0}), NAMES)
+    assert "has Ts and dt that differ" in refused(read, tmp_path, json.dumps({**LISTS, "dt": 1.0}), NAMES)
     assert "Ts: 1 x 2; allowed: one number" in refused(read, tmp_path, PARTS | {"Ts": [T, T]}, NAMES)
     for more, beside in (
         ({"inputs": INPUTS[::-1]}, ""),

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 from loop_designs import amber, controlled, ctms_position, emps, without
+from loop_designs import response as at
 from scipy.optimize import brentq
 from scipy.signal import cont2discrete
 
@@ -14,11 +15,6 @@ from actuator_lti import assemble_loops, load_design, plant
 from actuator_lti.design import Design, shipped_designs, with_overrides
 from actuator_lti.design.model import Friction, Gear, Motor
 from tests.refusals import refused
-
-
-def at(system: Any, omega: float) -> complex:
-    s = np.exp(1j * omega * system.dt) if system.isdtime(strict=True) else 1j * omega
-    return complex(system(s))
 
 
 def crossover(system: Any, low: float, high: float) -> tuple[float, float]:

@@ -150,17 +150,10 @@ def test_a_mode_at_rest_that_moves_from_tick_to_tick_is_taken_out(every: int) ->
     The angle it gains between two measurements belongs to the mode and begins anew with each. Truth is the
     closed loop over a whole period with the mode in it, the eigenvalue at 1 that stays.
     """
-    drive = load_design("ilr33-amber-multirate")
-    law = drive.controller
-    law = replace(
-        law,
-        current=replace(law.current, back_emf_feedforward=1.0),
-        velocity=replace(law.velocity, gain=0.02, every=every),
-        position=replace(law.position, every=every),
-    )
-    drive = replace(
-        drive, controller=law, friction=model.Friction(), encoder=replace(drive.encoder, speed="difference")
-    )
+    stages = {"current": {"back_emf_feedforward": 1.0}, "velocity": {"gain": 0.02, "every": every}}
+    parts = {"friction": model.Friction(), "encoder": {"speed": "difference"}}
+    parts["controller"] = {**stages, "position": {"every": every}}
+    drive = changed(load_design("ilr33-amber-multirate"), **parts)
     blocks = stage_blocks(wire(drive, Operating()), "current")
     over = np.linalg.multi_dot([np.eye(len(blocks[0].A)), *(b.feedback().A for b in reversed(blocks))])
     modes = np.linalg.eigvals(over)

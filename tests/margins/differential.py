@@ -103,7 +103,7 @@ def plain_sampled(rng: np.random.Generator) -> control.TransferFunction:
 FAR = 1e9  # ratio of gain margins that are compared behind a delay: 180 dB
 SURE = 100  # neighbours that all have to have the truth before another answer is called wrong
 MOST_RAD = 300.0  # that the delay turns by
-CERTIFIED_LATE = 0.05  # share of the loops behind a delay: by intervals in certified arithmetic, the slow way
+CERTIFIED_LATE = 0.1  # share of the loops behind a delay: by intervals in certified arithmetic, the slow way
 Family = Callable[[np.random.Generator], control.LTI]
 ALL: tuple[Family, ...] = (
     *FAMILIES, nearly_lossless, nearly_tangent, cancelled_on_the_border, hard_against_nyquist, plain_sampled,

@@ -34,27 +34,20 @@ def test_F3_second_order_with_delay(inner: bool) -> None:
     assert b.resonance_hz == pytest.approx(30 * math.sqrt(0.5), rel=1e-6)
 
 
-def test_F5_both_definitions_of_minus_3_db() -> None:
-    lag = control.tf([1], [1, 1])
-    half, exact = closed_loop_bandwidth(lag), closed_loop_bandwidth(lag, level="-3 dB")
-    assert half.minus3db_rad_s == pytest.approx(1.0, rel=1e-12)
-    assert exact.minus3db_rad_s == pytest.approx(0.997628345111, rel=1e-9)
-    assert half.definition == "1/sqrt(2)"
-    assert half.minus90deg_rad_s is None
-    assert "1/sqrt(2)" in str(half)
+MATHWORKS = {1: 1.2712, 2: 1.9991, 3: 2.5298, 4: 2.9678, 5: 3.3493}
 
 
-def test_F6_sampled() -> None:
-    b = closed_loop_bandwidth(control.tf([0.5], [1, -0.5], 0.001))
-    assert b.minus3db_hz == pytest.approx(115.026728081, rel=1e-9)
-
-
-@pytest.mark.parametrize(
-    ("m", "bandwidth"), [(1, 1.2712), (2, 1.9991), (3, 2.5298), (4, 2.9678), (5, 3.3493)]
-)
-def test_F7_MathWorks(m: int, bandwidth: float) -> None:
-    for loop in (m / (s**2 + s + m), control.ss(m / (s**2 + s + m))):
-        assert closed_loop_bandwidth(loop, level="-3 dB").minus3db_rad_s == pytest.approx(bandwidth, abs=5e-5)
+@pytest.mark.parametrize(("system", "level", "rad_s", "within"), [
+    (1 / (s + 1), "1/sqrt(2)", 1.0, 1e-12), (1 / (s + 1), "-3 dB", 0.997628345111, 1e-9),  # F5
+    (control.tf([0.5], [1, -0.5], 0.001), "1/sqrt(2)", 2 * math.pi * 115.026728081, 1e-9),  # F6
+    *((m / (s**2 + s + m), "-3 dB", w, 5e-5 / w) for m, w in MATHWORKS.items()),  # F7
+])  # fmt: skip
+def test_F5_F6_F7_published(system: control.LTI, level: str, rad_s: float, within: float) -> None:
+    for form in (system, control.ss(system)):
+        b = closed_loop_bandwidth(form, level=level)
+        assert b.minus3db_rad_s == pytest.approx(rad_s, rel=within)
+        assert (b.definition, level in str(b)) == (level, True)
+        assert (b.minus90deg_rad_s is None) == (b.minus3db_rad_s <= 1.0)  # of one lag alone
 
 
 def test_a_negative_response_is_measured_from_its_own_phase() -> None:

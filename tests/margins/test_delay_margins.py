@@ -1,12 +1,10 @@
 """Exact delays: against closed forms, whole samples as states, Walton and Marshall, and a dense grid."""
 
-import functools
 import math
 
 import control
 import numpy as np
 import pytest
-from margin_families import poly, roots_of, uniform
 from margin_truth import behind_delay, facts, unlike
 from mpmath import mp, mpf
 from scipy.optimize import brentq
@@ -19,22 +17,6 @@ from actuator_lti.systems.delay_system import DelaySystem
 s = control.tf("s")
 
 
-@pytest.mark.parametrize(
-    ("num", "factors", "delay_s"),
-    [
-        ([20e6], [[1, 0], [1, 0.001, 1e6]], 1e-4),  # B2, a thousand times less damped
-        ([1e-3], [[1, 2.05], [1, 0.2, 0.39], [1, 0.25], [1, 0, 0]], 0.05),  # close to the axis for decades
-    ],
-    ids=["a resonance between the points of any grid", "a double integrator close to the negative axis"],
-)
-def test_unstable_loops_behind_a_delay(num: list[float], factors: list[list[float]], delay_s: float) -> None:
-    loop = control.tf(num, functools.reduce(np.polymul, factors))
-    m = stability_margins(loop, delay_s=delay_s)
-    assert m.stable is False
-    expected = behind_delay(loop, delay_s, min(m.band_rad_s[1], 600.0 / delay_s))
-    assert unlike(facts(m), expected, deg=1e-6) is None
-
-
 def test_delay_margin_in_a_sampled_loop_brings_the_verdict_to_change() -> None:
     loop = control.tf([0.5], [1, -1], 0.001)
     limit = stability_margins(loop).delay_margin_s
@@ -42,23 +24,18 @@ def test_delay_margin_in_a_sampled_loop_brings_the_verdict_to_change() -> None:
     assert stability_margins(loop, delay_s=1.01 * limit).stable is False
 
 
-def test_collocated_poles_are_those_of_the_exact_delay() -> None:
-    closed = (DelaySystem.from_system(control.tf([100], [1, 0])) * DelaySystem.delay(0.005)).feedback()
-    values = np.linalg.eigvals(collocated(delay_form(closed), 24))
-    rightmost = values[np.argmax(values.real)]
-    assert abs(rightmost + 100 * np.exp(-0.005 * rightmost)) < 1e-7  # s + K exp(-s T) = 0
-
-
 def test_nested_loops_with_delays_have_as_many_unstable_poles_as_collocation_finds() -> None:
     rng = np.random.default_rng(8)
     verdicts = []
-    for _ in range(25):
+    for _ in range(14):
         k1, k2 = 10 ** rng.uniform(1, 3), 10 ** rng.uniform(0.5, 2.5)
         t1, t2 = rng.uniform(2e-4, 3e-3, 2)
         inner = (DelaySystem.from_system(k1 / (s * (s / 2000 + 1))) * DelaySystem.delay(t1)).feedback()
         loop = inner * DelaySystem.delay(t2) * DelaySystem.from_system(k2 / s)
         m = stability_margins(loop)
         poles = np.linalg.eigvals(collocated(delay_form(loop.feedback()), 40))
+        rightmost = poles[np.argmax(poles.real)]  # that of the exact delays, by its own equation
+        assert abs(loop.feedback().characteristic(rightmost)) < 1e-6 * abs(rightmost) ** len(loop.A)
         assert m.agreement.unstable_poles == np.count_nonzero(poles.real > 0.0)
         verdicts.append(m.stable)
     assert True in verdicts
@@ -88,12 +65,17 @@ THREE_LAGS = control.tf([9e3], np.polymul([1.0, 1e3, 1e6], [1e-3, 1.0]))
     (control.tf([0.5], [1, 1]), 1e6, 20 * math.log10(2.0)),
     (control.tf([0.01], [1, 1]), 1e5, 40.0),
     (control.tf([1.0], [1, 0, 0]) * control.tf([1.0], [1.0, 1.0]), 1e-3, None),
+    (20e6 / (s * (s**2 + 0.001 * s + 1e6)), 1e-4, None),  # B2, a thousand times less damped: unstable
+    # unstable, close to the negative real axis for decades
+    (1e-3 / ((s + 2.05) * (s**2 + 0.2 * s + 0.39) * (s + 0.25) * s**2), 0.05, None),
+    # an integrator and a notch in front of a resonance: the gain is low, then high again; above 40 dB in it
+    (3 / s * (s**2 + 0.2 * s + 4) / (s**2 + 8 * s + 4) * 400 / (s**2 + 0.1 * s + 400), 2.27, None),
 ])  # fmt: skip
-def test_the_nearest_gain_margin_is_found_whatever_its_size(loop, delay_s, db, certify) -> None:
-    if certify and delay_s > 1.0:
+def test_every_gain_margin_is_found_whatever_its_size(loop, delay_s, db, certify) -> None:
+    if certify and delay_s > 1e3:
         pytest.skip("by hand, or by the other way: too many turns for certified intervals")
     m = stability_margins(loop, delay_s=delay_s, certify=certify)
-    expected = behind_delay(loop, delay_s, min(m.band_rad_s[1], 300.0 / delay_s))
+    expected = behind_delay(loop, delay_s, min(m.band_rad_s[1], 600.0 / delay_s))
     assert m.evidence == ("certified" if certify else "checked")
     assert unlike(facts(m), expected, 1e-8, 1e-6) is None
     if db is not None:
@@ -111,15 +93,6 @@ def test_as_the_delay_goes_to_0_the_lists_are_those_of_the_loop_without_it(certi
         listed = [g.ratio for g in m.gain_margins if g.frequency_rad_s < 100.0]
         assert listed == pytest.approx([g.ratio for g in free.gain_margins], rel=0.1 * delay_s / 1e-6)
     assert m.band_rad_s == (0.0, math.inf)
-
-
-@pytest.mark.parametrize("certify", [False, True])
-def test_margins_above_40_db_inside_the_band_are_listed(certify: bool) -> None:
-    """An integrator and a notch in front of a resonance: the gain is low, then high again."""
-    loop = 3 / s * (s**2 + 0.2 * s + 4) / (s**2 + 8 * s + 4) * 400 / (s**2 + 0.1 * s + 400)
-    m = stability_margins(loop, delay_s=2.27, certify=certify)
-    expected = behind_delay(loop, 2.27, m.band_rad_s[1])
-    assert unlike(facts(m), expected, 1e-8, 1e-6) is None
 
 
 def test_default_band_ends_where_the_gain_stays_below_minus_40_db() -> None:
@@ -143,34 +116,6 @@ def test_a_delay_of_many_turns_is_summarised(delay_s: float) -> None:
     assert (low, m.evidence) == (0.0, "checked")
     assert "are not listed" in m.notes[0]
     assert m.modulus_margin == pytest.approx(abs(1.0 - 1.0 / m.gain_margin.ratio), rel=1e-2)  # as delay grows
-
-
-LOOPS = 12
-
-
-def random_loop(rng: np.random.Generator) -> tuple[control.TransferFunction, float]:
-    """Strictly proper, one or two integrators or none, and a delay that matters at the last crossover."""
-    n = int(rng.integers(1, 5))
-    poles = roots_of(rng, n, 2.0, wrong=0.15) + [0j] * int(rng.integers(0, 3))
-    zeros = roots_of(rng, int(rng.integers(0, len(poles))), 2.0)
-    num, den = poly(zeros), poly(poles)
-    w = uniform(rng, -1.0, 1.0)
-    gain = uniform(rng, -0.5, 1.0) / abs(np.polyval(num, 1j * w) / np.polyval(den, 1j * w))
-    return control.tf(gain * num, den), uniform(rng, -2.0, 0.7) / w
-
-
-@pytest.mark.parametrize("seed", range(LOOPS))
-def test_verdict_crossovers_and_crossings_under_a_delay(seed: int) -> None:
-    rng = np.random.default_rng([seed, 7])
-    loop, delay_s = random_loop(rng)
-    m = stability_margins(loop, delay_s=delay_s, certify=True)
-    assert m.evidence == "certified", m.evidence_reason
-    assert m.stable is (m.agreement.unstable_poles == 0)
-    expected = behind_delay(loop, delay_s, m.band_rad_s[1])
-    assert unlike(facts(m), expected, 1e-8, deg=1e-6) is None
-    w = np.geomspace(1e-5, max(2.0 * m.band_rad_s[1], 1e3), 600_000)
-    L = np.polyval(loop.num[0][0], 1j * w) / np.polyval(loop.den[0][0], 1j * w) * np.exp(-1j * w * delay_s)
-    assert m.modulus_margin <= np.abs(1.0 + L).min() * (1.0 + 1e-9)
 
 
 def test_many_turns_of_the_delay_are_certified_on_request() -> None:

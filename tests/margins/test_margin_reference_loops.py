@@ -221,22 +221,15 @@ def test_published_margins(name: str, in_states: bool) -> None:
     assert m.delay_margin_s == pytest.approx(min(delays, default=math.inf) if stable else 0.0, rel=1e-6)
 
 
-def test_A1_disk_margin_of_Seiler_Packard_Gahinet_2020() -> None:
-    disk = stability_margins(CASES["A1"][0]).disk_margin
-    assert disk.alpha == pytest.approx(0.458092547742, rel=1e-9)
-    assert disk.deg == pytest.approx(25.8017, abs=1e-3)
-    assert disk.db == pytest.approx(4.0508, abs=1e-3)
-    assert disk.frequency_rad_s == pytest.approx(1.95502689534, rel=1e-6)
-
-
-@pytest.mark.parametrize(
-    ("name", "modulus", "omega"),
-    [("A3", 0.296988793339, 0.766612851992), ("A6", 0.559084939016, 9.99184422487)],
-)
-def test_modulus_margin(name: str, modulus: float, omega: float) -> None:
-    m = stability_margins(CASES[name][0])
-    assert m.modulus_margin == pytest.approx(modulus, rel=1e-9)
-    assert m.modulus_frequency_rad_s == pytest.approx(omega, rel=1e-6)
+def test_disk_margin_of_Seiler_Packard_Gahinet_2020_and_modulus_margins() -> None:
+    a1, a3, a6 = (stability_margins(CASES[name][0]) for name in ("A1", "A3", "A6"))
+    disk = a1.disk_margin
+    assert [disk.alpha, a3.modulus_margin, a6.modulus_margin] == pytest.approx(
+        [0.458092547742, 0.296988793339, 0.559084939016], rel=1e-9
+    )
+    assert [disk.deg, disk.db] == pytest.approx([25.8017, 4.0508], abs=1e-3)
+    places = [disk.frequency_rad_s, a3.modulus_frequency_rad_s, a6.modulus_frequency_rad_s]
+    assert places == pytest.approx([1.95502689534, 0.766612851992, 9.99184422487], rel=1e-6)
 
 
 def test_D1_delay_margins_and_the_list_of_a_band() -> None:

@@ -289,15 +289,20 @@ def lagging(wc: float, lag: float, delay: float) -> Response:
     return lambda w: (wc / (1j * w)) * np.exp(-1j * w * delay) / (1 + 1j * w / lag)
 
 
+def crossover(wc: float, lag: float, delay: float) -> tuple[float, float]:
+    """Where (w/wc)^2 (1 + (w/lag)^2) = 1, and the phase margin there in deg."""
+    w = lag * math.sqrt(0.5 * (math.sqrt(1.0 + 4.0 * (wc / lag) ** 2) - 1.0))
+    return w, 90.0 - math.degrees(math.atan(w / lag) + w * delay)
+
+
 @pytest.mark.parametrize("count", [6, 8, 12, 16, 24])
 def test_few_noisy_points_hold_the_truth_in_99_of_100(count: int) -> None:
-    """A crossover in closed form: (w/wc)^2 (1 + (w/lag)^2) = 1; margin and delay margin at it."""
+    """A crossover in closed form; margin and delay margin at it."""
     rng = np.random.default_rng(count)
     held = listed = 0
     for _ in range(200):
         wc, lag, delay = 10.0 ** rng.uniform((1.0, 1.0, -4.0), (1.5, 3.0, -2.3))
-        w = lag * math.sqrt(0.5 * (math.sqrt(1.0 + 4.0 * (wc / lag) ** 2) - 1.0))
-        deg = 90.0 - math.degrees(math.atan(w / lag) + w * delay)
+        w, deg = crossover(wc, lag, delay)
         omega = np.geomspace(w / 3.0, 3.0 * w, count)
         noisy = lagging(wc, lag, delay)(omega) * (1.0 + 0.02 * circular(rng, omega.shape))
         m = stability_margins(control.frd(noisy, omega))
@@ -325,14 +330,9 @@ WC, LAG, DELAY = 30.0, 200.0, 2e-3
 CIRCLE = 0.03 * GAUSSIAN
 
 
-def phase_margin_of_the_lag() -> float:
-    w = LAG * math.sqrt(0.5 * (math.sqrt(1.0 + 4.0 * (WC / LAG) ** 2) - 1.0))
-    return 90.0 - math.degrees(math.atan(w / LAG) + w * DELAY)
-
-
 def widths(omega: np.ndarray, noise: float, known: bool, draws: int, seed: int) -> tuple[float, float, float]:
     """Median width of the phase margin's range, share of ranges that hold it, rms error of the figure."""
-    rng, true = np.random.default_rng(seed), phase_margin_of_the_lag()
+    rng, true = np.random.default_rng(seed), crossover(WC, LAG, DELAY)[1]
     exact = lagging(WC, LAG, DELAY)(omega)
     found = []
     for _ in range(draws):

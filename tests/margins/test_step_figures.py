@@ -158,7 +158,10 @@ def test_grid_and_order_do_not_matter(omega: list[float], delay_s: float) -> Non
 
 
 def test_unwrapping_refuses() -> None:
-    refused(unwrapped_phase_deg, 1 / s, [0.0], words="positive")
+    for none in ([0.0], "a", None, 1j, [[1], [1, 2]]):
+        refused(
+            unwrapped_phase_deg, 1 / s, none, words="omega_rad_s: every frequency must be positive and finite"
+        )
     refused(unwrapped_phase_deg, control.tf([1], [1, 0.5], 0.01), [400.0], words="Nyquist")
     refused(unwrapped_phase_deg, control.frd([1.0, 0.5], [1.0, 2.0]), [4.0], words="measured")
 

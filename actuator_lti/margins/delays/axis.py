@@ -109,9 +109,11 @@ def zeros(axis: Axis, q: Form, edges: list[float]) -> list[arb]:
         if low == 0.0 and order_at_zero:
             if high < _NARROWEST * edges[1]:
                 raise NumericalError("a crossing next to zero frequency could not be determined")
-            return _order_holds(axis, q, high, order_at_zero)
-        inside, half = q.along(*axis.over(low, high)), _half(low, high)
-        value, slope = inside(half), inside.derivative()(half)
+            inside = axis.series([arb(0).union(arb(high))] * (order_at_zero + 1))
+            derivative = q.along(*inside)[order_at_zero]  # keeps its sign: no further zero there
+            return bool(derivative > 0 or derivative < 0)
+        along, half = q.along(*axis.over(low, high)), _half(low, high)
+        value, slope = along(half), along.derivative()(half)
         if value > 0 or value < 0:
             return True
         if slope > 0 or slope < 0:
@@ -161,13 +163,6 @@ def _order(series: fmpq_poly, first: int) -> int:
         if series[k] != 0:
             return k
     raise NumericalError("the loop does not leave the line at zero frequency")
-
-
-def _order_holds(axis: Axis, q: Form, high: float, order: int) -> bool:
-    """Whether the derivative of that order keeps its sign on [0, high]: no further zero there."""
-    inside = arb(0).union(arb(high))
-    derivative = q.along(*axis.series([inside] * (order + 1)))[order]
-    return bool(derivative > 0 or derivative < 0)
 
 
 def turn(axis: Axis, edges: list[float]) -> arb:

@@ -43,7 +43,7 @@ def certified_delayed_margins(
         lists = [_reals(axis, band) for axis in axes]
         for merge in (False, True) if len(set(counts)) == 1 else ():
             if found.problem is not None:
-                found = _shared(axes, lists, merge)
+                found = shared(*((_gains(a, merge), each[0]) for a, each in zip(axes, lists, strict=True)))
         if found.problem is None:
             near = [smallest(axes[0], d, _known(d, found.reals, start)) for d in (MODULUS, DISK)]
             figures = Figures(found.gains, found.reals, near)
@@ -73,10 +73,6 @@ def _known(distance: Distance, reals: Crossings, start: StabilityMargins | None)
         disk = start.disk_margin.alpha, start.disk_margin.frequency_rad_s
         places.append(modulus if distance is MODULUS else disk)
     return min(places, default=NOWHERE)
-
-
-def _shared(axes: list[Axis], lists: list[tuple[Crossings, float, float]], merge: bool) -> Shared:
-    return shared(*((_gains(axis, merge), reals) for axis, (reals, *_) in zip(axes, lists, strict=True)))
 
 
 def _gains(axis: Axis, merge: bool) -> Crossings:

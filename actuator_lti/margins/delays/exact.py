@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -189,7 +188,10 @@ def _determinants(whole: fmpq_mat, n: int) -> list[fmpq_poly]:
     states, q, found = range(n), whole.nrows() - n, []
     for mask in range(1 << q):
         there = [n + k for k in range(q) if mask >> k & 1]
-        A, B, C, D = (_part(whole, rows, columns) for rows in (states, there) for columns in (states, there))
+        A, B, C, D = (
+            fmpq_mat(len(rows), len(columns), [whole[r, c] for r in rows for c in columns])
+            for rows in (states, there) for columns in (states, there)
+        )  # fmt: skip
         K = _exact_matrix(np.eye(len(there))) - D
         if K.det() == 0:
             raise InputError("delays feed back on themselves at once: of neutral type, no margins are given")
@@ -199,10 +201,6 @@ def _determinants(whole: fmpq_mat, n: int) -> list[fmpq_poly]:
             if mask >> k & 1:
                 found[mask] -= found[mask ^ (1 << k)]
     return found
-
-
-def _part(M: fmpq_mat, rows: Sequence[int], columns: Sequence[int]) -> fmpq_mat:
-    return fmpq_mat(len(rows), len(columns), [M[r, c] for r in rows for c in columns])
 
 
 def _exact_matrix(M: Any) -> fmpq_mat:

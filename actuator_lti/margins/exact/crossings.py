@@ -104,19 +104,15 @@ def _merged(
         close = out and float(((v - out[-1][0]) / v).mid()) < _NEAR
         if close and not touch and not out[-1][1]:
             between = (0.5 * (out[-1][0] + v)).mid()
-            if _touches(between, off):
+            if abs(float(off(between).mid())) <= TOUCH:
                 out[-1] = (between, True)
                 continue
         out.append((v, touch))
     for root, _ in roots:
         missed = root.imag > 0 and root.real > 0 and float((root.imag / root.real).mid()) < _NEAR
-        if missed and _touches(root.real.mid(), off):
+        if missed and abs(float(off(root.real.mid()).mid())) <= TOUCH:
             out.append((root.real.mid(), True))
     return sorted(out, key=lambda place: float(place[0].mid()))
-
-
-def _touches(v: arb, off: Callable[[arb], arb]) -> bool:
-    return abs(float(off(v).mid())) <= TOUCH
 
 
 def smallest(N: fmpz_poly, D: fmpz_poly, distance: Distance) -> tuple[float, float]:
@@ -131,13 +127,10 @@ def smallest(N: fmpz_poly, D: fmpz_poly, distance: Distance) -> tuple[float, flo
 
     def stationary() -> list[tuple[float, float]] | None:
         values = [(above(v) / below(v), v) for v, _ in positive_roots(slope, spans)]
-        if not all(_settled(value) for value, _ in values):
+        values = [(value, v) for value, v in values if value.is_finite()]
+        if any(x.rel_accuracy_bits() < 53 and float(x.abs_upper()) >= _ZERO**2 for x, _ in values):
             return None
-        return [
-            (math.sqrt(max(float(value.mid()), 0.0)), float(v.sqrt().mid()))
-            for value, v in values
-            if value.is_finite()
-        ]
+        return [(math.sqrt(max(float(x.mid()), 0.0)), float(v.sqrt().mid())) for x, v in values]
 
     found = at_enough_bits(stationary, _FIRST_BITS + slope.degree(), "the smallest distance to -1")
     value, w = min([*candidates, *found])
@@ -162,20 +155,12 @@ def _deepest(above: fmpz_poly, below: fmpz_poly) -> Spans:
             places = [((a + b) / 2).mid() for a, b in inside]
             spans = tuple(
                 (
-                    -math.inf if a < edges[0] else _log2(a) - _NEAR,
-                    math.inf if b > edges[-1] else _log2(b) + _NEAR,
+                    -math.inf if a < edges[0] else float(a.log().mid()) / math.log(2.0) - _NEAR,
+                    math.inf if b > edges[-1] else float(b.log().mid()) / math.log(2.0) + _NEAR,
                 )
                 for a, b in inside
             )
     return spans
-
-
-def _log2(v: arb) -> float:
-    return float(v.log().mid()) / math.log(2.0)
-
-
-def _settled(value: arb) -> bool:
-    return value.rel_accuracy_bits() >= 53 or not value.is_finite() or float(value.abs_upper()) < _ZERO**2
 
 
 def _ratio(above: fmpz_poly, below: fmpz_poly, lowest: bool) -> float:

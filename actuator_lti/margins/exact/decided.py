@@ -71,12 +71,12 @@ def _partner(c: Crossing, others: Crossings) -> Crossing | None:
     """The crossing that is the same one in another list."""
     first = bisect_left(others, c.w / (1.0 + _SAME_W), key=attrgetter("w"))
     beside = takewhile(lambda other: other.w <= c.w * (1.0 + _SAME_W), islice(others, first, None))
-    same = (other for other in beside if c.touch == other.touch and _same_size(abs(c.L), abs(other.L)))
-    return next(same, None)
-
-
-def _same_size(a: float, b: float) -> bool:
-    return a == b or (min(a, b) > 0.0 and abs(math.log(a / b)) < _SAME_GAIN)
+    for other in beside:
+        a, b = abs(c.L), abs(other.L)
+        alike = a == b or (min(a, b) > 0.0 and abs(math.log(a / b)) < _SAME_GAIN)
+        if alike and c.touch == other.touch:
+            return other
+    return None
 
 
 def _difference(ours: Crossings, theirs: Crossings, line: str) -> str | None:

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property, lru_cache, partial
+from functools import cached_property, lru_cache
 from itertools import pairwise, zip_longest
 from typing import Any, TypeVar
 
@@ -119,23 +119,21 @@ def half_planes(p: fmpz_poly) -> HalfPlanes:
     if symmetric.degree() > 0:
         mirrored = symmetric(_SQUARE)
         p = p // (mirrored // mirrored.content())
-        squares = all_roots(symmetric)
-        real = [(v.real.sqrt(), times) for v, times in squares if v.imag.is_zero() and v.real > 0]
-        border = sorted(real, key=lambda pair: float(pair[0].mid()))
+        for v, times in all_roots(symmetric):  # v = -s^2: s on the axis exactly where v is real and positive
+            on_axis = v.imag.is_zero() and v.real > 0
+            root = acb(0, v.real.sqrt()) if on_axis else (-v).sqrt()
+            border += [(root.imag, times)] if on_axis else []
+            placed += [(root, times), (-root, times)]
+        border.sort(key=lambda pair: float(pair[0].mid()))
         right = symmetric.degree() - sum(times for _, times in border)
-        placed += [(side * _root_of(v), times) for v, times in squares for side in (1, -1)]
-    return HalfPlanes(right + _count_right(p), at_zero, tuple(border), partial(_repeated, p, placed))
+    beyond = right_of_axis(p)
+    if beyond is None:
+        beyond = sum(times for root, times in _told_from_axis(p) if root.real > 0)
 
+    def found() -> tuple[acb, ...]:
+        return tuple(root for root, times in (*placed, *_told_from_axis(p)) for _ in range(times))
 
-def _repeated(p: fmpz_poly, placed: list[tuple[acb, int]]) -> tuple[acb, ...]:
-    """Every root as often as it is repeated: those that are placed, and those of p, all off the axis."""
-    return tuple(root for root, times in (*placed, *_told_from_axis(p)) for _ in range(times))
-
-
-def _count_right(p: fmpz_poly) -> int:
-    """Roots to the right of the axis, of a polynomial that has none on it."""
-    right = right_of_axis(p)
-    return sum(times for root, times in _told_from_axis(p) if root.real > 0) if right is None else right
+    return HalfPlanes(right + beyond, at_zero, tuple(border), found)
 
 
 def right_of_axis(p: fmpz_poly) -> int | None:
@@ -177,11 +175,6 @@ def warped(p: Polynomial, degree: int) -> Polynomial:
     about: list[Any] = list(p(kind([-1, 2])).coeffs())
     about += [0] * (degree + 1 - len(about))
     return kind(about[::-1])(kind([1, -1]))
-
-
-def _root_of(v: acb) -> acb:
-    """s with v = -s^2, on the axis exactly where v is real and positive."""
-    return acb(0, v.real.sqrt()) if v.imag.is_zero() and v.real > 0 else (-v).sqrt()
 
 
 def _told_from_axis(p: fmpz_poly) -> list[tuple[acb, int]]:
