@@ -73,10 +73,8 @@ class Command:
         return replace(self, samples=samples, end_s=self.end_s + start_s)
 
     def highest_content(self, nyquist_hz: float) -> float:
-        """Largest line of a tabulated command above a frequency, as a part of its range.
-
-        Of the samples put on an even grid, without their straight line, under a Hann window.
-        """
+        """Largest line of a tabulated command above a frequency, as a part of its range."""
+        # of the samples put on an even grid, without their straight line, under a Hann window
         if self.samples is None or self.samples.shape[1] < LEAST_SPECTRUM:
             return 0.0
         times, values = self.samples
@@ -150,8 +148,8 @@ def _count(given: object, bound: Bound, name: str = "") -> None:
     bound.check(count, name=name)
 
 
-def _frequencies(kind: str, given: Sequence[float]) -> Floats:
-    """Positive frequencies, at least one and not too many."""
+def _frequencies(kind: str, given: Sequence[float], period_s: float) -> Floats:
+    """Positive frequencies that samples can hold, at least one and not too many."""
     _count(given, TONES)
     f = numbers_of(f"command {kind}: frequencies_hz", given)
     TONES.check(f.size)
@@ -159,6 +157,9 @@ def _frequencies(kind: str, given: Sequence[float]) -> Floats:
         _positive(kind, frequencies_hz=float(one))
     if not f.size:
         raise InputError(f"command {kind}: at least one frequency needed")
+    if f.max() * period_s >= 0.5:
+        message = f"command {kind}: {f.max():g} Hz: must be below the Nyquist frequency"
+        raise InputError(f"{message} of its table, {0.5 / period_s:g} Hz")
     return f
 
 
@@ -235,7 +236,7 @@ def stepped_sine(
     """
     _finite("stepped_sine", amplitude_rad=amplitude_rad)
     _positive("stepped_sine", period_s=period_s)
-    f = _sampled_at("stepped_sine", _frequencies("stepped_sine", frequencies_hz), period_s)
+    f = _frequencies("stepped_sine", frequencies_hz, period_s)
     whole_number("command stepped_sine: cycles", cycles)
     whole_number("command stepped_sine: settle_cycles", settle_cycles, 0)
     SIGNAL_ROWS.check(cycles + settle_cycles)
@@ -269,11 +270,10 @@ def multisine(
     """
     _finite("multisine", amplitude_rad=amplitude_rad)
     _positive("multisine", duration_s=duration_s, period_s=period_s)
-    given = _frequencies("multisine", frequencies_hz)
+    wanted = _frequencies("multisine", frequencies_hz, period_s)
     SIGNAL_ROWS.check(duration_s / period_s)
-    TONE_TICKS.check(given.size * duration_s / period_s)
+    TONE_TICKS.check(wanted.size * duration_s / period_s)
     whole_number("command multisine: seed", seed, 0)
-    wanted = _sampled_at("multisine", given, period_s)
     periods = np.rint(wanted * duration_s)
     if periods.min() < 1.0:
         message = f"command multisine: {wanted.min():g} Hz: less than one period in {duration_s:g} s"
@@ -288,14 +288,6 @@ def multisine(
     values = np.concatenate([_summed(f, phases, part) for part in np.array_split(t, t.size // _ROWS + 1)])
     values *= amplitude_rad / np.abs(values).max()
     return _table("multisine", t, values, float(f.max()))
-
-
-def _sampled_at(kind: str, f: Floats, period_s: float) -> Floats:
-    """The frequencies, refused where samples cannot hold one."""
-    if f.max() * period_s >= 0.5:
-        message = f"command {kind}: {f.max():g} Hz: must be below the Nyquist frequency"
-        raise InputError(f"{message} of its table, {0.5 / period_s:g} Hz")
-    return f
 
 
 def _summed(frequency_hz: Floats, phases: Floats, t: Floats) -> Floats:

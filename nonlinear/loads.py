@@ -36,8 +36,7 @@ def constant(moment_Nm: float) -> LoadMoment:
 
 def proportional(slope_Nm_rad: float, offset_Nm: float = 0.0) -> LoadMoment:
     """Load torque ``offset + slope * output angle``; a negative slope pulls the canard back."""
-    offset = finite_number("offset_Nm", offset_Nm)
-    return LoadMoment(constant_Nm=offset, slope_Nm_rad=finite_number("slope_Nm_rad", slope_Nm_rad))
+    return LoadMoment(constant_Nm=finite_number("offset_Nm", offset_Nm), slope_Nm_rad=slope_Nm_rad)
 
 
 def series(time_s: npt.ArrayLike, moment_Nm: npt.ArrayLike, where: str = "load series") -> LoadMoment:

@@ -5,7 +5,6 @@ beside it; an installation does so (`actuator_lti.compiled.library`).
 """
 
 import sys
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -39,23 +38,9 @@ LIBRARY = Library("run", _FOLDER, _ENTRIES, source_files(_FOLDER / "_kernels", P
 def resume(
     p: Floats, s: Floats, tables: Floats, history: Floats, flags: Flags, out: Floats, shared: Floats
 ) -> int:
-    """Go on from the state ``s``, which is changed, until tick ``p[TICKS]``, see `nonlinear._kernels.run`.
-
-    ``history`` is (columns, rows) or empty.
-    """
+    """Go on from the state ``s`` to tick ``p[TICKS]``; ``history`` is (columns, rows) or empty."""
     io, block = np.zeros(layout.IO_SIZE), np.zeros(layout.BLOCK_SIZE)
     return int(LIBRARY.functions.run(p, s, io, block, tables, history.reshape(-1), flags, out, shared))
-
-
-def resumed(
-    p: Floats, s: Floats, io: Floats, block: Floats, tables: Floats, history: Floats, flags: Flags,
-    out: Floats, shared: Floats,
-) -> Callable[[], int]:  # fmt: skip
-    """A call that runs the state ``s`` on to tick ``p[TICKS]``; the caller keeps all the rows."""
-    bound: Callable[[], int] = LIBRARY.functions.run.bound(
-        p, s, io, block, tables, history, flags, out, shared
-    )
-    return bound
 
 
 def parameters(row: Floats) -> tuple[Floats, Floats]:

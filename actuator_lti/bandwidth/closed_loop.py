@@ -60,7 +60,10 @@ def closed_loop_bandwidth(system: Any, delay_s: Delay = 0.0, level: Level = "1/s
         return measured_bandwidth(system, delay_s, level)
     if hasattr(system, "delays_s"):
         if (plain := plain_behind_delay(system, delay_s)) is None:
-            return _of_delays(system, delay_s, level)
+            found = DelayResponse.of(delay_form(system, delay_s))
+            if found.order:
+                raise InputError(_POLE if found.order > 0 else _NO_GAIN)
+            return _bandwidth(found, found.first_turn(_FLOOR * abs(found.lead)), level, None)
         system, delay_s = plain
     system = _without_rest_mode(of_scipy(system))
     loop, given = rational_loop(system), given_of(system)
@@ -99,13 +102,6 @@ def _without_rest_mode(system: Any) -> Any:
     in_z = system.dt is not None and system.dt != 0
     A, B, C, kept = without_rest_mode(system.A, system.B, system.C, 1.0 if in_z else 0.0)
     return system if kept.all() else PlainSystem(A, B, C, system.D, system.dt)
-
-
-def _of_delays(system: Any, delay_s: float, level: Level) -> Bandwidth:
-    response = DelayResponse.of(delay_form(system, delay_s))
-    if response.order:
-        raise InputError(_POLE if response.order > 0 else _NO_GAIN)
-    return _bandwidth(response, response.first_turn(_FLOOR * abs(response.lead)), level, None)
 
 
 def _bandwidth(

@@ -85,7 +85,11 @@ class DelayStepper:
         t -= self.start_s
         if t > self._last:
             self._turned((u - self._u) / (t - self._last))
-            self._walk(t)
+            while t - self._t > self._same:
+                self._advance(self._smooth_until(min(t, self._t + self._shortest)))
+                if self._next is not None and self._next[0] - self._t <= self._same:
+                    self._pass_on(*self._next)
+                    self._next = None
             self._last, self._u = t, u.copy()
         z = self._delayed(np.array([t]), np.array([t + self._near]))[0]
         return self._state, (self._C @ self._state + self._D @ np.concatenate([z, u]))[len(self._delays) :]
@@ -104,13 +108,6 @@ class DelayStepper:
         driven[len(self._state) :].reshape(_ORDERS, -1)[1, -m:] = (slope - self._slope) * self._unit
         self._pass_on(self._last, (self._jumps @ driven).reshape(_ORDERS, -1))
         self._slope, self._driven = slope, np.zeros_like(driven)
-
-    def _walk(self, t: float) -> None:
-        while t - self._t > self._same:
-            self._advance(self._smooth_until(min(t, self._t + self._shortest)))
-            if self._next is not None and self._next[0] - self._t <= self._same:
-                self._pass_on(*self._next)
-                self._next = None
 
     def _smooth_until(self, limit: float) -> float:
         """The next instant at which something that matters jumps, or the limit."""

@@ -88,7 +88,6 @@ class Asked:
         usual = {"stop_rad": stop, **({"speed_rad_s": 0.5 * full_command(design)} if turns else {})}
         made = given(usual, stated, chosen)
         if "speed_rad_s" in made and not turns:
-            raise InputError(
-                f"speed_rad_s = {made['speed_rad_s']:.6g}: allowed of a drive commanded in speed"
-            )
+            name = "speed_rad_s" if "speed_rad_s" in given(chosen) else "failure.speed"
+            raise InputError(f"{name} = {made['speed_rad_s']:.6g}: allowed of a drive commanded in speed")
         return cls(**{"deflection_rad": NEAR_SHARE * made["stop_rad"], **made})

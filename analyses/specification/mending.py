@@ -54,36 +54,35 @@ def mending(point: WeakPoint, survey: LoopSurvey, corners: Corners | None = None
     if not point.view.loop or point.view.rotor == "locked":
         return None
     others = [each for each in views(survey, corners) if each.loop and each.rotor != "locked"]
-    mended = [point.view, *(each for each in others if each.stable is False)]
-    found = sorted(_moves(mended, survey.design), key=lambda move: move.change)
-    return next((move for move in found if _harmless(move, others, survey.design)), None)
-
-
-def _moves(weak: Sequence[View], design: Design) -> Iterator[Move]:
-    """For each gain the least change either way that mends the views."""
-    for path in GAINS:
-        if path not in design.parameters or not (was := parameter_value(design, path)):
+    mended = _by_point([point.view, *(each for each in others if each.stable is False)])
+    least: Move | None = None
+    for path, was, end in _ways(survey.design):
+        steps = np.geomspace(was, end, STEPS + 1)
+        within = steps if least is None else steps[np.abs(np.log(steps / was)) < least.change]
+        if not (first := _first(mended, survey.design, path, within)):
             continue
-        low, high = allowed_range(design, path)
-        for end in (max(was / SPAN, low), min(was * SPAN, high)):
-            steps = np.geomspace(was, end, STEPS + 1)
-            first = _first(weak, design, path, steps)
-            if first is not None and first > 0:
-                between = np.geomspace(steps[first - 1], steps[first], STEPS + 1)
-                value = float(between[_first(weak, design, path, between) or STEPS])
-                unit = 10.0 ** (np.floor(np.log10(abs(value))) - 2)  # three digits, away from what it was
-                written = unit * (np.ceil if value > was else np.floor)(value / unit * (1.0 - 1e-12))
-                yield Move(path, was, float(f"{written:.3g}"))
+        between = np.geomspace(steps[first - 1], steps[first], STEPS + 1)
+        place = _first(mended, survey.design, path, between) or STEPS
+        move = Move(path, was, _written(float(between[place]), was))
+        if (least is None or move.change < least.change) and _harmless(move, others, survey.design):
+            least = move
+    return least
 
 
-def _first(weak: Sequence[View], design: Design, path: str, values: np.ndarray) -> int | None:
-    """Which value is the first within the limits of all views; a point is asked what those before leave."""
-    left = np.arange(len(values))
-    for same in _by_point(weak):
-        left = left[_reserves(same, design, path, values[left]).min(axis=0) >= 0.0]
-        if not left.size:
-            return None
-    return int(left[0])
+def _ways(design: Design) -> Iterator[tuple[str, float, float]]:
+    """Each gain, what it is, and how far it may go, down and up."""
+    for path in GAINS:
+        if path in design.parameters and (was := parameter_value(design, path)):
+            low, high = allowed_range(design, path)
+            yield path, was, max(was / SPAN, low)
+            yield path, was, min(was * SPAN, high)
+
+
+def _first(points: Sequence[Sequence[View]], design: Design, path: str, values: np.ndarray) -> int | None:
+    """Which value is the first within the limits of all views; after one point each is asked by itself."""
+    left = np.flatnonzero(_reserves(points[0], design, path, values).min(axis=0) >= 0.0)
+    mends = (k for k in left if all(_reserves(p, design, path, values[[k]]).min() >= 0.0 for p in points[1:]))
+    return next(map(int, mends), None)
 
 
 def _by_point(views: Iterable[View]) -> list[list[View]]:
@@ -92,6 +91,12 @@ def _by_point(views: Iterable[View]) -> list[list[View]]:
     for view in views:
         points.setdefault((id(view.design), view.kind, view.load_Nm), []).append(view)
     return list(points.values())
+
+
+def _written(value: float, was: float) -> float:
+    """A value of three digits, away from what it was."""
+    unit = 10.0 ** (np.floor(np.log10(abs(value))) - 2)
+    return float(f"{unit * (np.ceil if value > was else np.floor)(value / unit * (1.0 - 1e-12)):.3g}")
 
 
 def _reserves(same: Sequence[View], design: Design, path: str, values: np.ndarray) -> np.ndarray:

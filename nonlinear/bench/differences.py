@@ -66,26 +66,20 @@ class Differences:
         self.scale = np.concatenate([scale, np.full(self.updates, self.kick)])
 
     def _led(self) -> None:
-        """Let the commands before the first be those of the motion: else it is fed forward to there.
-
-        What an integral of the position holds of a standing drive is in no row, either.
-        """
+        """Let the commands before the first be those of the motion: else it is fed forward to there."""
         setup, start = self.setup, self.drive.start
         place, N, speed = setup.design.controller.position, setup.design.total_ratio, setup.bias.speed_rad_s
         if place is None or setup.outer != "position":
             return
         if speed == 0.0 and place.integral_time_s is not None:
-            start[at.S_POSITION_INTEGRATOR] = setup.wanted
+            start[at.S_POSITION_INTEGRATOR] = setup.wanted  # in no row, either
         size, since_s = self.injected.rows.values[0, [at.BIAS + 1, at.BIAS + 2]]
         now = -N * size * since_s if speed else N * size
         period_s = place.every * setup.design.controller.period_s
         start[[at.S_REFERENCE, at.S_REFERENCE_BEFORE]] = now - speed * period_s * np.array([1.0, 2.0])
 
     def parts(self) -> Iterator[tuple[Parts, Floats, float]]:
-        """A, B, C, D; stated errors of A over C beside B over D; the largest of the response, relative.
-
-        One after the other for each thing that is read.
-        """
+        """A, B, C, D, errors of A over C beside B over D, the largest of the response, of each thing read."""
         n, readings = self.moved.size, self.injected.readings
         rows = [
             np.concatenate([np.arange(n), n + np.arange(k, self.updates * readings, readings)])
@@ -101,10 +95,7 @@ class Differences:
         return whole[:n, :n], whole[:n, n:], whole[n:, :n], whole[n:, n:]
 
     def _felt(self, whole: Floats) -> Pair:
-        """What errors of the entries do to the response, over its size, see `sensitivities`.
-
-        At `GRID`, and behind it where slow poles are.
-        """
+        """What errors of entries do to the response, over its size: at `GRID`, and where slow poles are."""
         n = self.moved.size
         angles = np.abs(np.linalg.eigvals(balanced(whole[:n, :n])[0] - np.eye(n))) / self.updates
         slow = angles[(angles > SLOWEST) & (angles < GRID[0])]  # but of those at rest
@@ -176,10 +167,8 @@ class Differences:
 
     @cached_property
     def _largest(self) -> Floats:
-        """Steps far above the kick's own motion that in no tick move the speed out of the flat part of tanh.
-
-        Where it was between two ends of periods no event says, as of dry friction: the law is smooth.
-        """
+        """Steps far above the kick's own motion that in no tick leave the flat part of tanh."""
+        # where it was between two ends of periods no event says, as of dry friction: the law is smooth
         steps, bias = FAR * self.scale, self.setup.bias
         if self.setup.design.friction.law != "tanh" or not bias.friction_on:
             return steps
@@ -194,11 +183,9 @@ class Differences:
         return np.fmin(steps, bias.room_rad_s * steps / np.maximum(moved, 1e-250))
 
     def _tried(self, rows: list[Places]) -> list[tuple[_Columns, Pair]]:
-        """Columns by steps that fall by tens, of the rows of each thing that is read, and what is felt there.
-
-        Of each column until it had three without an event, and the last did not bend.  Where events forbid
-        the larger ones, they begin with the largest without one, found by halves.
-        """
+        """Columns by steps that fall by tens, of each thing that is read, and what is felt there."""
+        # of each column until it had three without an event, and the last did not bend; where events forbid
+        # the larger ones, they begin with the largest without one, found by halves
         steps, going, seen = self._largest, np.ones(self.scale.size, bool), np.zeros(self.scale.size, bool)
         felt, tried = list[Pair](), list[Pair]()
         for tries in range(1, MOST_DECADES + 1):
@@ -227,10 +214,8 @@ class Differences:
         raise NumericalError(f"{self.where}: every step of {name} ends in an event")
 
     def _grown(self, rows: list[Places], tried: list[Pair], felt: list[Pair]) -> list[tuple[_Columns, Pair]]:
-        """The same with larger steps of columns that the largest knows best, while they agree better.
-
-        A number that hardly moves beside large ones is lost in their rounding at steps by its own motion.
-        """
+        """The same with larger steps of columns that the largest knows best, while they agree better."""
+        # a number that hardly moves beside large ones is lost in their rounding at steps by its own motion
         steps = self._largest
         for _ in range(GROWN):
             columns = [_Columns(tried, each) for each in rows]
@@ -242,10 +227,7 @@ class Differences:
         return [(_Columns(tried, each), seen) for each, seen in zip(rows, felt, strict=True)]
 
     def _differences(self, steps: Floats) -> Pair:
-        """Central differences over all numbers, one a row, and what rounding may make of them.
-
-        NaN where the step is 0 or lost in the number, and where an event took place.
-        """
+        """Central differences, a number a row, and their rounding; NaN where lost, or an event was."""
         asked = np.flatnonzero(steps > 0.0)
         K = asked.size
         columns = np.full((2, steps.size, self.moved.size + self.updates * self.injected.readings), np.nan)

@@ -31,10 +31,7 @@ class Watched:
 
 
 class Injection:
-    """A place of a drive: where the signal is added, how much would be large there, and what is read.
-
-    What comes back, where ``watched`` has None; else the signal in front of a limiter.
-    """
+    """A place of a drive: where a signal is added, what is large there, what is read (None: what returns)."""
 
     def __init__(self, setup: LoopSetup, place: str, watched: Sequence[Watched | None] = (None,)) -> None:
         design = setup.design

@@ -40,10 +40,8 @@ def without_rest(A: Floats, errors: Floats, most: int) -> tuple[Floats, Floats]:
 
 
 def _at_rest(turned: Floats, errors: Floats, size: Floats) -> tuple[Floats, Floats]:
-    """The v, its largest part 1, that A - 1 makes least of by what is allowed of each row; and what that is.
-
-    An integrator's row is known to rounding, a bent load's to the errors of its columns.
-    """
+    """The v, largest part 1, that A - 1 makes least of by what is allowed of each row; what that is."""
+    # an integrator's row is known to rounding, a bent load's to the errors of its columns
     v, allowed = np.zeros(len(turned)), np.ones(len(turned))
     for _ in range(3):
         v = _nearest_to_rest(turned / allowed[:, None])

@@ -17,13 +17,8 @@ from actuator_lti.design.plant import reachable_speed
 from actuator_lti.drive.wiring import Drive, wire
 from actuator_lti.errors import InputError
 from nonlinear._kernels import layout as at
-from nonlinear.bench.operating_motion import (
-    OperatingMotion,
-    full_torque_Nm,
-    may_stand,
-    operating_motion,
-    standing,
-)
+from nonlinear.bench import operating_motion as motion
+from nonlinear.bench.operating_motion import OperatingMotion, full_torque_Nm
 from nonlinear.bench.probe import Probe
 from nonlinear.bench.steady_control import own_start, steady_state
 from nonlinear.rows import Rows
@@ -176,10 +171,8 @@ class LoopSetup:
         return start.command
 
     def _position(self, row: Rows, wanted: float) -> None:
-        """Let the command run with the drive, ahead of the motor by what the controller needs.
-
-        The motor starts at zero: a large angle would round what its derivative is made of.
-        """
+        """Let the command run with the drive, ahead of the motor by what the controller needs."""
+        # the motor starts at zero: a large angle would round what its derivative is made of
         N, speed = self.design.total_ratio, self.bias.speed_rad_s
         if self._own == "position":
             command = self._own_start(row, wanted) / N
@@ -243,10 +236,10 @@ def loop_setup(design: Design, loop: str, *, limits_on: bool = True, held: bool 
     known = (*wired.stages, *wired.points, *PATHS)
     if loop not in known:
         raise InputError(f"loop = {loop!r}: one of {', '.join(known)}", where=design.name)
-    result = LoopSetup(design, loop, operating_motion(design), limits_on, held)
+    result = LoopSetup(design, loop, motion.operating_motion(design), limits_on, held)
     unsteady = (result.outer == "position" and remembers(design)) or not result.steady_start
-    if unsteady and may_stand(design):
-        return LoopSetup(design, loop, standing(design), limits_on, held)
+    if unsteady and motion.may_stand(design):
+        return LoopSetup(design, loop, motion.standing(design), limits_on, held)
     return result
 
 

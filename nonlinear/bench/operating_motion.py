@@ -13,17 +13,9 @@ import numpy as np
 
 from actuator_lti.design.model import Command, Coupling, Design, Friction, Instruments, LoadFriction, Sensor
 from actuator_lti.design.plant import reachable_speed
+from actuator_lti.drive import operating
 from actuator_lti.drive.facts import passed_moment_Nm, slopes_torque
-from actuator_lti.drive.operating import (
-    Operating,
-    averaged,
-    dry_torque,
-    follows_angle,
-    friction_slopes,
-    holding_moment_Nm,
-    holding_torque_Nm,
-    segments,
-)
+from actuator_lti.drive.operating import Operating, follows_angle, holding_moment_Nm, holding_torque_Nm
 from actuator_lti.drive.steady import motor_torque_Nm, steady_input
 from actuator_lti.errors import InputError
 from nonlinear.bench.steady_control import commands_fit
@@ -150,7 +142,7 @@ def on_its_stand(design: Design, like: Design | None = None) -> Design:
     load is damped none by load, which grows with the speed and is no part of its loops.  ``like`` is the
     drive that is tested, if another.
     """
-    design, tested = averaged(design), averaged(like or design)
+    design, tested = operating.averaged(design), operating.averaged(like or design)
     friction = design.friction
     if follows_angle(tested):
         friction = replace(friction, load_coefficient=0.0, points=(), viscous_reverse_Nms_rad=None)
@@ -238,7 +230,8 @@ def operating_motion_at(design: Design, speed_rad_s: float, load_Nm: float = 0.0
         twist = design.coupling.twist_rad(coupling_Nm)
         torque = passed * coupling_Nm / design.ratio_to_coupling
         torque += sense * friction.load_coefficient * design.ratio_behind_coupling * abs(coupling_Nm)
-    own = dry_torque(design, 0.0, sense) + slopes_torque(friction_slopes(design, sense), abs(speed_rad_s))
+    slopes = operating.friction_slopes(design, sense)
+    own = operating.dry_torque(design, 0.0, sense) + slopes_torque(slopes, abs(speed_rad_s))
     torque += sense * float(own) + friction.offset_torque_Nm
     room = _room(friction, abs(speed_rad_s), sense)
     current, voltage = steady_input(design, torque, speed_rad_s)
@@ -260,8 +253,8 @@ def _room(friction: Friction, speed_rad_s: float, sense: int) -> float:
         x = speed_rad_s / friction.smoothing_speed_rad_s
         flat = x > 300.0 or cosh(x) ** -2 < FLAT
         return min(ROOM * speed_rad_s, speed_rad_s - least) if flat else 0.0
-    bends = [0.0, *(start for start, _ in segments(friction.map(sense)))] if friction.points else [0.0]
-    return ROOM * min(abs(speed_rad_s - bend) for bend in bends)
+    bends = [start for start, _ in operating.segments(friction.map(sense))] if friction.points else []
+    return ROOM * min(abs(speed_rad_s - bend) for bend in (0.0, *bends))
 
 
 def on_the_bench(design: Design) -> Design:

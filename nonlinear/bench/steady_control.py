@@ -19,10 +19,8 @@ CONSISTENT = 1e-9  # of the largest term of an equation: what rounding leaves of
 
 
 def commands_fit(design: Design, motion: OperatingMotion) -> bool:
-    """Whether commands leave room to the limits: a controller without an integral needs an error.
-
-    What a law of one's own needs is its own affair: it is tested with the limits lifted.
-    """
+    """Whether commands leave room to the limits: a controller without an integral needs an error."""
+    # what a law of one's own needs is its own affair: it is tested with the limits lifted
     limits, wanted = design.limits, motion.voltage_V
     for stage, limit in (("current", limits.peak_current_A), ("velocity", limits.speed_rad_s)):
         loop = getattr(design.controller, stage)

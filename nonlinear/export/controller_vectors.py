@@ -12,6 +12,7 @@ from actuator_lti.types import Floats
 from nonlinear._kernels import layout as at
 from nonlinear.export.c_files import exported_row
 from nonlinear.export.controller_cut import MOTOR_COUNTS, Controller
+from nonlinear.export.program import filled
 from nonlinear.export.variables import sizes
 from nonlinear.native import control_tick, parameters, tick
 
@@ -190,17 +191,9 @@ def vectors_text(ours: Controller, prefix: str, *, single_precision: bool) -> st
     for struct, row in zip((ours.out, ours.state), bounds, strict=True):
         lines = ",\n".join(_check(struct, *each) for each in zip(struct.members, row, strict=True))
         checks.append(f"static const check {struct.argument}_checks[] = {{\n{lines}\n}};")
-    return "\n".join([
-        "/* Ticks of the simulator: state before, what the controller saw, output, state behind it. */",
-        "#include <stddef.h>", '#include "controller.h"', "",
-        "typedef struct {", "    const char *name;", "    size_t at;", "    int count;",
-        "    int whole; /* 1: a whole number */", "    double bound; /* of the difference */", "} check;", "",
-        f"enum {{ VECTORS = {len(vectors)}, OUT_CHECKS = {len(ours.out.members)}, "
-        f"STATE_CHECKS = {len(ours.state.members)} }};", "", *checks, "",
-        "static const struct {", f"    {prefix}controller_state before;", f"    {prefix}controller_input in;",
-        f"    {prefix}controller_output out;", f"    {prefix}controller_state after;", "} vectors[] = {",
-        ",\n".join(rows), "};", "",
-    ])  # fmt: skip
+    counts = {"VECTORS": vectors, "OUT_CHECKS": ours.out.members, "STATE_CHECKS": ours.state.members}
+    texts = {"prefix": prefix, "CHECKS": "\n".join(checks), "ROWS": ",\n".join(rows)}
+    return filled("controller_vectors.h", {name: str(len(each)) for name, each in counts.items()} | texts)
 
 
 def _check(struct: Struct, member: Member, bound: float) -> str:

@@ -47,10 +47,8 @@ REMEMBERED = np.array([
 
 
 def cut_of(q, stage):
-    """Where the loop of a stage is cut: with a law of one's own at what that gives.
-
-    Only to that of the current something is added on the way to the break point that it drives.
-    """
+    """Where the loop of a stage is cut: with a law of one's own at what that gives."""
+    # only to that of the current something is added on the way to the break point that it drives
     own = q[layout.OWN_STAGE]
     position = stage == POSITION and own == layout.OWN_POSITION
     if stage == CURRENT and own == layout.OWN_CURRENT:
@@ -178,10 +176,8 @@ def noted(q, s, k, j, seen):
 
 
 def one_column(q, s, io, stage, every, size, places, count, angles, j, blocks, begin, apart, seen):
-    """Run the drive as it stands over one period; returns what the loop gave, NaN where a tick failed.
-
-    The states after it are written into ``blocks`` from ``begin`` on, so many numbers ``apart``.
-    """
+    """Run the drive over one period; returns what the loop gave, NaN where a tick failed."""
+    # the states after it go into blocks from begin on, so many numbers apart
     put_inputs(q, s, io, stage, size)
     value = 0.0
     for k in range(every):
@@ -209,10 +205,8 @@ def until_next(every, ticks):
 
 
 def put_unit(q, s, places, j, angles, ticks):
-    """Put the drive into the j-th unit state, -1: at rest; the motor's angle takes the stored ones with it.
-
-    The slower stages are where they are so many ticks after they all ran.
-    """
+    """Put the drive into the j-th unit state, -1: at rest; the motor's angle takes stored ones with it."""
+    # the slower stages are where they are so many ticks after they all ran
     at_rest(q, s)
     s[layout.S_UNTIL_OUTER] = until_next(int(q[layout.OUTER_EVERY]), ticks)
     s[layout.S_UNTIL_VELOCITY] = until_next(int(q[layout.EVERY_VELOCITY]), ticks)
@@ -225,10 +219,7 @@ def put_unit(q, s, places, j, angles, ticks):
 
 
 def block(q, s, io, stage, first, every, places, n, angles, blocks, at, seen):
-    """A, b, c, one after the other, of the loop as run over ``every`` ticks from tick ``first``.
-
-    0 where a tick failed.
-    """
+    """A, b, c of the loop as run over ``every`` ticks from tick ``first``; 0 where a tick failed."""
     for j in range(n):
         put_unit(q, s, places, j, angles, first)
         value = one_column(q, s, io, stage, every, 0.0, places, n, angles, j, blocks, at + j, n, seen)

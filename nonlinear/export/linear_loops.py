@@ -29,10 +29,8 @@ SHOWN = 3  # of them
 
 
 def phases_of(p, q, s, io, stage, blocks, places, seen):
-    """A, b, c of each phase into ``blocks``; the states, or what stands in the way.
-
-    Closed, but for the only phase of a loop that is cut: that one stays open.
-    """
+    """A, b, c of each phase into ``blocks``; the states, or what stands in the way."""
+    # closed, but for the only phase of a loop that is cut: that one stays open
     linear_row(p, q)
     every, whole = linear.interval(q, stage), linear.repeats(q, stage)
     if every <= 0:
@@ -107,11 +105,8 @@ def joined(n, count, kept, blocks, keep, a, b, c):
 
 
 def assembled(p, q, s, io, stage, blocks, places, keep, seen, a, b, c):
-    """A, b, c of a loop of the drive with the parameters p; the number of states, or what stands in the way.
-
-    ``q``, ``s`` and ``io`` are rows of a second drive that is run here; ``q[PERIOD]`` and ``interval`` give
-    the period.
-    """
+    """A, b, c of a loop of the drive p; the number of states, or what stands in the way."""
+    # q, s and io are rows of a second drive that is run here; q[PERIOD] and `interval` give the period
     n = phases_of(p, q, s, io, stage, blocks, places, seen)
     if n <= 0:
         return n
@@ -190,10 +185,7 @@ def responded(n, h, b, c, count, xs, rs, work, state, exchanged):
 
 
 def limiters_assembled(p, q, s, io, blocks, places, keep, seen, a, b, c):
-    """A and b of the closed drive from its command, and rows of ``seen`` (tick, signal): states, then d.
-
-    The number of states, or what stands in the way.
-    """
+    """A, b of the closed drive from its command, rows of ``seen`` (tick, signal): states, then d."""
     n = phases_of(p, q, s, io, linear.COMMAND, blocks, places, seen)
     if n <= 0:
         return n
@@ -251,12 +243,9 @@ def largest_change(n, seen, signal, every, step, x, state):
 
 
 def limiter_sizes(q, n, a, b, seen, every, count, xs, sizes, work, state):
-    """Largest magnitude, over the ticks between two commands, of each signal in front of a limiter.
-
-    At each angle per interval of the command; ``sizes`` holds a row of ``count`` numbers for each signal,
-    then one for the rate of each, its change from update to update per second.  What a limit clamps beside
-    its signal, an integral, counts as that signal.
-    """
+    """Largest magnitude over a command's ticks of each signal in front of a limiter, at each angle."""
+    # sizes: a row for each signal, then one for its change from update to update per second; what a limit
+    # clamps beside its signal, an integral, counts as that signal
     for g in range(count):
         states_at(n, a, b, b, False, xs[g], work, state)
         for signal in range(linear.SEEN):

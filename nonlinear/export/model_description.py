@@ -32,8 +32,7 @@ def description(
 
 def _written(root: ET.Element) -> bytes:
     ET.indent(root)
-    text: bytes = ET.tostring(root, encoding="UTF-8", xml_declaration=True)
-    return text
+    return ET.tostring(root, encoding="UTF-8", xml_declaration=True)
 
 
 def _root(design: Design, token: str, sources: Sequence[str], version: int, tool: str) -> ET.Element:

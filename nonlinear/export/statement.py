@@ -53,11 +53,8 @@ class Statement:
     @property
     def data(self) -> list[Term]:
         """The statement for JSON: kind, target, what it does, terms; numbers that JSON lacks as text."""
-        return [self.kind, self.target, self.does, *map(_plain, self.terms)]
-
-
-def _plain(term: Term) -> Term:
-    return term if isinstance(term, str) or abs(term) < math.inf else str(term)
+        finite = (each if isinstance(each, str) or abs(each) < math.inf else str(each) for each in self.terms)
+        return [self.kind, self.target, self.does, *finite]
 
 
 def used(statements: Sequence[Statement]) -> tuple[Statement, ...]:

@@ -65,26 +65,16 @@ def program() -> Program:
     return emit_c({**ENTRIES, **_LINEAR})
 
 
-def _linear_header() -> str:
-    """Prototypes and lengths beyond those of ``drive.h``."""
-    known = {function.__name__ for function in _LINEAR}
-    heads = [text for name, text in program().declarations.items() if name in known]
-    sizes = [f"enum {{ {name} = {size} }};" for name, size in _SIZES.items()]
-    return "\n".join(["#include <stdbool.h>", *sizes, *heads, ""])
-
-
-def _source() -> str:
-    """The program behind its prototypes."""
-    emitted = program()
-    return "\n".join([HEAD, emitted.constants_text(), *emitted.helpers, emitted.types, emitted.functions])
-
-
 def sources() -> dict[str, str]:
-    """The C files of the module."""
+    """The C files of the module; ``linear.h`` has prototypes and lengths beyond those of ``drive.h``."""
+    emitted, known = program(), {function.__name__ for function in _LINEAR}
+    heads = [text for name, text in emitted.declarations.items() if name in known]
+    sizes = [f"enum {{ {name} = {size} }};" for name, size in _SIZES.items()]
+    parts = [HEAD, emitted.constants_text(), *emitted.helpers, emitted.types, emitted.functions]
     return {
         "drive.h": header_text(),
-        "linear.h": _linear_header(),
-        "drive.c": _source(),
+        "linear.h": "\n".join(["#include <stdbool.h>", *sizes, *heads, ""]),
+        "drive.c": "\n".join(parts),
         "wasm.c": template("wasm.c"),
     }
 
@@ -96,10 +86,7 @@ def sources_hash() -> str:
 
 
 def build_wasm() -> bytes:
-    """Compile the module with ziglang.
-
-    Raises `InputError`: without ziglang.
-    """
+    """Compile the module with ziglang; raises `InputError` without it."""
     return compile_files(sources(), _NAME, "wasm", _FLAGS)
 
 

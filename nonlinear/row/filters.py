@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from actuator_lti.design.model import Command, Filter
+from actuator_lti.design.model import Filter
 from actuator_lti.errors import InputError
 
 Section = tuple[Any, Any, Any, Any, Any]  # floats, or arrays stacked over designs
@@ -13,10 +13,7 @@ Polynomial = tuple[Any, Any, Any]
 
 
 def tustin(b: Polynomial, a: Polynomial, w0: Any, period_s: Any) -> Section:
-    """``(b2 s^2 + b1 s + b0)/(a2 s^2 + a1 s + a0)`` sampled by ``s = c (z - 1)/(z + 1)``, exact at w0.
-
-    ``c = w0/tan(w0 T/2)``; coefficients are those of falling powers of s.
-    """
+    """``(b2 s^2 + b1 s + b0)/(a2 s^2 + a1 s + a0)``, falling powers, by Tustin's rule, exact at w0."""
     c = w0 / np.tan(0.5 * w0 * period_s)
 
     def sampled(q: Polynomial) -> Polynomial:
@@ -59,11 +56,6 @@ def section(item: Filter, period_s: Any, where: str = "") -> Section:
     if item.order == 1:
         return tustin((0.0, 0.0, w0), (0.0, 1.0, w0), w0, period_s)
     return tustin((0.0, 0.0, w0 * w0), (1.0, 2.0 * item.damping * w0, w0 * w0), w0, period_s)
-
-
-def command_section(command: Command, period_s: Any, where: str = "") -> Section:
-    """The command filter at the period of the outermost stage: a low-pass with w0 = 1/filter_time."""
-    return section(command.lowpass(period_s, where), period_s, where)
 
 
 def _given(item: Filter, name: str, where: str) -> Any:

@@ -14,7 +14,7 @@ from actuator_lti.errors import InputError
 from actuator_lti.types import Floats
 from nonlinear._kernels import layout as at
 from nonlinear.row.elastic import put_drive_train
-from nonlinear.row.filters import command_section, section
+from nonlinear.row.filters import section
 
 MAX_EVENTS_PER_TICK = 1000
 TANH_TOLERANCE = 1e-8
@@ -23,6 +23,10 @@ SEEDS = 2**31
 ANTI_WINDUP = get_args(AntiWindup)  # in the order of the kernel's numbers
 SPEED_SOURCES = get_args(SpeedSource)
 STAGES = ("current", "velocity", "position")  # in the order of the kernel's numbers
+CHAINS: dict[FilterPlace, tuple[int, int]] = {  # where their number stands, and the first of their sections
+    "speed": (at.SPEED_FILTERS, at.SPEED_CHAIN),
+    "torque": (at.TORQUE_FILTERS, at.TORQUE_CHAIN),
+}
 
 
 def split_delay(delay_s: Any, period_s: Any) -> tuple[Any, Any]:
@@ -153,8 +157,7 @@ def _controllers(design: Design, row: Floats) -> None:
         row[at.HAS_VELOCITY], row[at.EVERY_VELOCITY] = 1.0, velocity.every
         row[at.SPEED_SENSOR] = velocity.sensor == "output"
         _regulator(row, at.VELOCITY_GAIN, at.VELOCITY_WINDUP, velocity.gain, velocity, velocity.every * Ts)
-        for place in ("speed", "torque"):
-            _filters(design, row, place, velocity.every * Ts)
+        _filters(velocity, row, Ts, design.name)
     _encoder(design, row, row[at.EVERY_VELOCITY] * Ts)
     if current is not None:
         if not design.motor.has_electrical_dynamics:
@@ -209,19 +212,15 @@ def _regulator(
     row[windup_at + 1] = T / (loop.integral_time_s if loop.tracking_time_s is None else loop.tracking_time_s)
 
 
-def _filters(design: Design, row: Floats, place: FilterPlace, period_s: Any) -> None:
-    count_at, chain_at = {
-        "speed": (at.SPEED_FILTERS, at.SPEED_CHAIN),
-        "torque": (at.TORQUE_FILTERS, at.TORQUE_CHAIN),
-    }[place]
-    velocity = design.controller.velocity
-    chosen = () if velocity is None else velocity.filters_on(place)
-    if len(chosen) > at.MAX_SECTIONS:
-        message = f"control.velocity.filter: {len(chosen)} on the {place}: at most {at.MAX_SECTIONS} fit"
-        raise InputError(message, where=design.name)
-    row[count_at] = len(chosen)
-    for k, item in enumerate(chosen):
-        _put(row, chain_at + k * at.SECTION, section(item, period_s, where=design.name))
+def _filters(velocity: VelocityLoop, row: Floats, Ts: Any, where: str) -> None:
+    for place, (count_at, chain_at) in CHAINS.items():
+        chosen, T = velocity.filters_on(place), velocity.every * Ts
+        if len(chosen) > at.MAX_SECTIONS:
+            message = f"control.velocity.filter: {len(chosen)} on the {place}: at most {at.MAX_SECTIONS} fit"
+            raise InputError(message, where=where)
+        row[count_at] = len(chosen)
+        for k, item in enumerate(chosen):
+            _put(row, chain_at + k * at.SECTION, section(item, T, where=where))
 
 
 def _put(row: Floats, begin: int, numbers: Iterable[Any]) -> None:
@@ -301,7 +300,8 @@ def _command(design: Design, row: Floats) -> None:
         row[at.PROFILE_SAMPLES] = np.maximum(samples, 1.0)
     if _somewhere(command.filter_time_s > 0.0):
         row[at.COMMAND_FILTERS] = 1
-        _put(row, at.COMMAND_CHAIN, command_section(command, period, design.name))
+        lowpass = command.lowpass(period, design.name)
+        _put(row, at.COMMAND_CHAIN, section(lowpass, period, design.name))
 
 
 def _supply(design: Design, row: Floats) -> None:

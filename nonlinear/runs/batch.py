@@ -56,7 +56,7 @@ def simulate_many(
 
 def run_rows(
     rows: Floats,
-    tables: Floats | None = None,
+    tables: Floats,
     *,
     threads: int | None = None,
     progress: Progress = None,
@@ -69,30 +69,33 @@ def run_rows(
     Raises `TooManyTicks`: if the runs have more ticks than can be computed in a reasonable time.
     """
     rows = np.ascontiguousarray(rows, dtype=float)
-    ticks = float(rows[:, at.TICKS].sum())
+    ticks, n = float(rows[:, at.TICKS].sum()), len(rows)
     if not ticks <= BATCH_TICKS.most:
         raise TooManyTicks(f"{ticks:.3g} ticks to simulate; allowed: {BATCH_TICKS.allowed} in all runs")
-    series = np.zeros(1) if tables is None else np.ascontiguousarray(tables, dtype=float)
-    n = rows.shape[0]
-    outs, statuses = np.empty((n, at.OUT_SIZE)), np.empty(n, np.int64)
-    threads = available_threads() if threads is None else min(whole_number("threads", threads), len(rows))
+    result = BatchResult(rows=rows, outs=np.empty((n, at.OUT_SIZE)), status=np.empty(n, np.int64))
+    history, flags, shared, done = np.empty((0, 0)), np.empty(0, np.uint16), np.zeros(2), 0
+
+    def run_span(start: int, stop: int) -> int:
+        """Run rows start to stop in this thread, without the GIL; how many."""
+        for r in range(start, stop):
+            p, s = parameters(rows[r]) if drives is None else (drives[r].p, drives[r].s)
+            p[at.TICKS] = rows[r, at.TICKS]
+            result.status[r] = resume(p, s, tables, history, flags, result.outs[r], shared)
+        return stop - start
+
+    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    threads = cores if threads is None else min(whole_number("threads", threads), n)
     spans = _spans(rows[:, at.TICKS], threads)
-    done, shared = 0, np.zeros(2)
-    each = [None] * n if drives is None else drives
-    result = BatchResult(rows=rows, outs=outs, status=statuses)
     if len(spans) == 1 and ticks <= CHUNK_TICKS:  # not worth a thread
-        _run_span(rows, series, each, 0, n, outs, statuses, shared)
+        done = run_span(0, n)
         if progress is not None:
-            progress(n, n)
+            progress(done, n)
         return result
     with ThreadPoolExecutor(max_workers=max(1, threads)) as pool:
-        waiting = {
-            pool.submit(_run_span, rows, series, each, a, b, outs, statuses, shared): b - a for a, b in spans
-        }
+        waiting = [pool.submit(run_span, *span) for span in spans]
         try:
             for future in as_completed(waiting):
-                future.result()
-                done += waiting[future]
+                done += future.result()
                 if progress is not None:
                     progress(done, n)
         except BaseException:
@@ -101,25 +104,6 @@ def run_rows(
                 future.cancel()
             raise
     return result
-
-
-def _run_span(
-    rows: Floats, tables: Floats, drives: Sequence[Running | None], start: int, stop: int, outs: Floats,
-    statuses: np.ndarray, shared: Floats,
-) -> None:  # fmt: skip
-    """Run rows start to stop in this thread; the kernel runs without the GIL."""
-    history, flags = np.empty((0, 0)), np.empty(0, np.uint16)
-    for r in range(start, stop):
-        drive = drives[r]
-        p, s = parameters(rows[r]) if drive is None else (drive.p, drive.s)
-        p[at.TICKS] = rows[r, at.TICKS]
-        statuses[r] = resume(p, s, tables, history, flags, outs[r], shared)
-
-
-def available_threads() -> int:
-    """Cores this process may use."""
-    affinity = getattr(os, "sched_getaffinity", None)
-    return len(affinity(0)) if affinity else (os.cpu_count() or 1)
 
 
 def _spans(ticks: Floats, threads: int) -> list[tuple[int, int]]:

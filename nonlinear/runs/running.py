@@ -14,7 +14,7 @@ from actuator_lti.errors import InputError
 from actuator_lti.types import Floats
 from nonlinear._kernels import elastic_layout
 from nonlinear._kernels import layout as at
-from nonlinear.native import resume, resumed
+from nonlinear.native import LIBRARY, resume
 from nonlinear.runs.reduced import COLUMNS
 from nonlinear.runs.trajectory import STATUS, Status
 
@@ -102,10 +102,7 @@ class Running:
         return Running(self.p.copy(), self.s.copy(), self.tables)
 
     def held(self) -> Running | None:
-        """A copy whose command and load stay for ever as they now are, without noise; its ticks count from 0.
-
-        ``None`` where command, bias, load, torque or supply still change of themselves.
-        """
+        """A copy at tick 0, no noise, command and load as they now are; None where one still changes."""
         twin = self.copy()
         tick = int(self.s[at.S_TICK])
         for hold, places in ((_hold_signal, _SIGNALS), (_hold_table, at.TABLES)):
@@ -117,11 +114,10 @@ class Running:
 
     @cached_property
     def _tick(self) -> Callable[[], int]:
-        self._buffers = (  # kept: what is compiled has their places only
-            np.zeros(at.IO_SIZE), np.zeros(at.BLOCK_SIZE), self.tables, np.zeros(0),
-            np.zeros(0, np.uint16), np.zeros(at.OUT_SIZE), np.zeros(2),
-        )  # fmt: skip
-        return resumed(self.p, self.s, *self._buffers)
+        """A call that runs on to tick ``p[TICKS]``; the rows are kept: what is compiled has their places."""
+        rows, out = (np.zeros(at.IO_SIZE), np.zeros(at.BLOCK_SIZE), self.tables), np.zeros(at.OUT_SIZE)
+        self._kept = (*rows, np.zeros(0), np.zeros(0, np.uint16), out, np.zeros(2))
+        return LIBRARY.functions.run.bound(self.p, self.s, *self._kept)
 
     def run(self, ticks: int) -> None:
         """Run so many ticks on; a drive that has failed stands still."""

@@ -211,9 +211,8 @@ def _put_probes(row: Floats, probes: Sequence[Probe], tables: Tables) -> None:
         if isinstance(probe.injection, Command):
             _put_signal(row, place, probe.injection, tables)
         elif probe.injection is not None:
-            offset, length = tables.add(numbers_of("injection", probe.injection))
-            row[place], row[place + 1] = at.TABLE, 1.0
-            row[place + 3], row[place + 4] = offset, length
+            series = tables.add(numbers_of("injection", probe.injection))
+            row[place : place + 5] = at.TABLE, 1.0, 0.0, *series
 
 
 def put_state(row: Floats, state: State) -> None:

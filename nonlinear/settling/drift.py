@@ -47,10 +47,8 @@ def stays_overloaded(drive: Running) -> bool:
 
 
 def ticks_until_it_acts(p: Floats, s: Floats) -> int:
-    """Ticks after which the memory under this current trips or lets go; 0 where it does not get there.
-
-    The distance to ``(i/i_cont)^2`` falls by ``1 - a`` a tick.
-    """
+    """Ticks after which the memory under this current trips or lets go; 0 where it does not get there."""
+    # the distance to (i/i_cont)^2 falls by 1 - a a tick
     level = p[at.OVERLOAD_RELEASE] if s[at.S_OVERLOADED] > 0.0 else 1.0
     reached = (s[at.S_CURRENT] / p[at.CONTINUOUS_CURRENT]) ** 2
     way, left = reached - s[at.S_OVERLOAD], reached - level

@@ -69,10 +69,10 @@ class Rest:
 def judge(running: Running, most_work: int = MOST_WORK) -> Rest | None:
     """Follow a drive from its present state until it is known what it ends in.
 
-    ``running`` is that of a run (``run.running``) or of `nonlinear.Rows.running`, and is not changed.
-    ``most_work`` bounds the work, in ticks and integration steps within them; it ends with the part that
-    passes it. None where command, load or supply still change of themselves. Noise is left out: it is no
-    cycle.
+    ``running``: of a run (``run.running``) or of `nonlinear.Rows.running`; it is not changed.
+    ``most_work``: ticks and integration steps within them; it ends with the part that passes it.
+
+    None where command, load or supply still change of themselves. Noise is left out: it is no cycle.
 
     >>> from nonlinear import commands, simulate
     >>> judge(simulate("ilr33-amber", commands.step(0.01), 0.05).running).verdict
@@ -163,10 +163,8 @@ class _Watch:
         return piece
 
     def _breakaways(self) -> Floats:
-        """Time, entry, place (followed, motor) and direction, a column each, of breakaways in the last piece.
-
-        It stands while it moves no further in an entry than its share of what a window may (`drift.small`).
-        """
+        """Time, entry, place (followed, motor), direction: a column for each breakaway in the last piece."""
+        # it stands while it moves no further in an entry than its share of what a window may (`drift.small`)
         times, seen = np.concatenate(self.times[-2:]), np.concatenate(self.seen[-2:], axis=1)
         new = max(times.size - self.times[-1].size - 2, 0)  # whether the last entry before left is known now
         times, places = times[new:], seen[1:, new:]
@@ -245,10 +243,8 @@ class _Watch:
         self.periods += windows * drift.DRIFT
 
     def _returns(self) -> tuple[_Swing, int] | None:
-        """The swing between breakaways from one place in one direction, and its first entry; None: not known.
-
-        As near as a count of the sensors, or `STILL` of the largest angle, is the same place.
-        """
+        """The swing between breakaways from one place one way, and its first entry; None: not known."""
+        # as near as a count of the sensors, or `STILL` of the largest angle, is the same place
         p, left = self.drive.p, np.concatenate(self.left, axis=1)
         counts = p[at.COUNTS_PER_RAD] * p[at.RATIO], p[at.POSITION_COUNTS]
         far = max([self._least, *(1.0 / each for each in counts if each > 0.0)])

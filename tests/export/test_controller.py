@@ -23,6 +23,7 @@ STRICT = (
     "-Wall", "-Wextra", "-Wconversion", "-Wshadow", "-pedantic", "-Werror", "-Wdouble-promotion",
     "-Wfloat-conversion",
 )  # fmt: skip
+PROGRAMS = Path(__file__).with_name("firmware")
 MATHEMATICS = {"sqrt", "floor", "sqrtf", "floorf"}  # of a profile with limited acceleration
 pytestmark = pytest.mark.skipif(shutil.which("gcc") is None, reason="no gcc on this machine")
 
@@ -33,11 +34,16 @@ def written(folder: Path, design: Design, *, single: bool, prefix: str = "drive_
     return folder
 
 
+def said_by(folder: Path, source: Path | str) -> str:
+    """What a program around the controller prints."""
+    flags = ("-std=c99", "-O1", "-ffp-contract=off", *STRICT[:6], "-I.")
+    ran(folder, "gcc", *flags, str(source), "controller.c", "-lm", "-o", "run")
+    return ran(folder, "./run")
+
+
 def worst_of(folder: Path) -> dict[str, tuple[float, float]]:
     """Runs the vectors; difference and bound of each signal."""
-    call = ("-std=c99", "-O1", "-ffp-contract=off", *STRICT[:6], "main.c", "controller.c", "-lm", "-o", "run")
-    ran(folder, "gcc", *call)
-    *lines, last = ran(folder, "./run").splitlines()
+    *lines, last = said_by(folder, "main.c").splitlines()
     rows = [line.split(",") for line in lines[2:]]
     assert int(last.split()[0]) > 10
     return {f"{name}{k}": (float(a), float(b)) for k, (name, a, b) in enumerate(rows)}
@@ -60,57 +66,16 @@ def test_vectors_of_the_simulator_hold_and_no_library_is_called(name: str, singl
     assert (moved > 0.0) if single else (moved < 1e-10)
 
 
-SIZEOF = """#include "controller.h"
-#include <stdio.h>
-int main(void)
-{
-    printf("state %zu bytes, input %zu bytes, output %zu bytes.", sizeof(drive_controller_state),
-           sizeof(drive_controller_input), sizeof(drive_controller_output));
-    return 0;
-}
-"""
-
-
 @pytest.mark.parametrize("single", [False, True])
 @pytest.mark.parametrize("name", ["fin", "ballscrew"])
 def test_the_readme_says_what_sizeof_gives_and_how_to_compile(name: str, single: bool, tmp_path: Path):
     """Padding is what the compiler says; the line of the readme links what a profile with a root calls."""
     folder, readme = written(tmp_path, load_design(name), single=single), (tmp_path / "README.md")
-    (folder / "size.c").write_text(SIZEOF)
-    ran(folder, "gcc", "-std=c99", "size.c", "-o", "size")
-    assert ran(folder, "./size") in readme.read_text()
+    assert said_by(folder, PROGRAMS / "size.c") in readme.read_text()
     (line,) = re.findall(r"^    (cc .*) && ./vectors$", readme.read_text(), re.M)
     ran(folder, *line.split())
 
 
-CHIP = """#include "controller.h"
-#include <math.h>
-float sqrtf(float x)
-{
-    float result;
-    __asm__("vsqrt.f32 %0, %1" : "=t"(result) : "t"(x));
-    return result;
-}
-float floorf(float x)
-{
-    const float whole = (float)(int)x;
-    return (whole > x) ? whole - 1.0f : whole;
-}
-static drive_controller_state state;
-volatile drive_controller_input measured;
-volatile drive_controller_output put_out;
-void _start(void)
-{
-    drive_controller_input in = measured;
-    drive_controller_output out;
-    drive_controller_start(&state, &in);
-    for (;;) {
-        in = measured;
-        drive_controller_step(&state, &in, &out);
-        put_out = out;
-    }
-}
-"""
 CORTEX_M4F = ("-target", "thumb-freestanding-eabihf", "-mcpu=cortex_m4+vfp4d16sp")
 
 
@@ -119,11 +84,10 @@ CORTEX_M4F = ("-target", "thumb-freestanding-eabihf", "-mcpu=cortex_m4+vfp4d16sp
 def test_it_links_for_a_cortex_m4f_with_no_library_at_all(name: str, tmp_path: Path) -> None:
     """No library of the compiler either: a ``double`` or a copied array would miss its function here."""
     folder = written(tmp_path, load_design(name), single=True)
-    (folder / "chip.c").write_text(CHIP)
     (folder / "math.h").write_text("float sqrtf(float);\nfloat floorf(float);\n")
     zig, *cc = zig_command() or ()
-    plain = ("-std=c99", "-O2", "-ffp-contract=off", "-ffreestanding", "-nostdlib", "-isystem", ".")
-    ran(folder, zig, *cc, *CORTEX_M4F, *plain, "chip.c", "controller.c", "-o", "chip")
+    plain = ("-std=c99", "-O2", "-ffp-contract=off", "-ffreestanding", "-nostdlib", "-isystem", ".", "-I.")
+    ran(folder, zig, *cc, *CORTEX_M4F, *plain, str(PROGRAMS / "chip.c"), "controller.c", "-o", "chip")
     data = (folder / "chip").read_bytes()
     machine, flags = struct.unpack_from("<H", data, 18)[0], struct.unpack_from("<I", data, 36)[0]
     assert (machine, flags & 0x400) == (40, 0x400)  # ARM, floating-point numbers in registers
@@ -168,26 +132,6 @@ def test_a_coefficient_that_is_off_is_seen(tmp_path: Path) -> None:
     assert re.search(r"\b[1-9]\d* outside of the bound", done.stdout)
 
 
-HOST = """#include "one/controller.hpp"
-#include "two/controller.hpp"
-#include <cstdio>
-int main()
-{
-    const one::Controller::Input at_rest = one::Controller::Input();
-    one::Controller first(at_rest), second(at_rest);
-    two::Controller other((two::Controller::Input()));
-    one::Controller::Input in = at_rest;
-    in.command_rad = 0.1f;
-    for (int k = 0; k < 50; k += 1) { (void)first.step(in); }
-    second.restore(first.state());
-    const bool same = first.step(in).voltage_V == second.step(in).voltage_V;
-    std::printf("%d|%d|%s|%s", (int)same, ONE_CONTROLLER_FLAG_VOLTAGE, ONE_CONTROLLER_DESIGN_HASH,
-                TWO_CONTROLLER_DESIGN);
-    return other.step(two::Controller::Input()).flags;
-}
-"""
-
-
 @pytest.mark.skipif(shutil.which("g++") is None, reason="no g++ on this machine")
 def test_two_designs_in_one_program_of_cpp_by_their_prefixes(tmp_path: Path) -> None:
     for prefix, name in (("one_", "ilr33-amber"), ("two_", "emps")):
@@ -198,38 +142,9 @@ def test_two_designs_in_one_program_of_cpp_by_their_prefixes(tmp_path: Path) -> 
         symbols = [line.split()[-1] for line in ran(folder, "nm", "-g", "controller.o").splitlines()]
         assert len(symbols) == 3
         assert all(symbol.startswith(prefix) for symbol in symbols)
-    (tmp_path / "host.cpp").write_text(HOST)
-    call = ("-std=c++11", "-Wall", "-Wextra", "-Werror", "host.cpp", "one/controller.o", "two/controller.o")
-    ran(tmp_path, "g++", *call, "-o", "host")
+    call = ("-std=c++11", "-Wall", "-Wextra", "-Werror", "-I.", str(PROGRAMS / "host.cpp"))
+    ran(tmp_path, "g++", *call, "one/controller.o", "two/controller.o", "-o", "host")
     assert ran(tmp_path, "./host") == f"1|{at.FLAG_VOLTAGE}|{design_hash(load_design('ilr33-amber'))}|emps"
-
-
-ROUND = """#include "controller.h"
-#include <stdio.h>
-int main(void)
-{
-    drive_controller_state states[2];
-    drive_controller_output out[2];
-    for (int k = 0; k < 400; k += 1) {
-        const uint32_t begin[2] = {0U, 0x7ffff000U}; /* the second goes round after 4096 counts */
-        for (int n = 0; n < 2; n += 1) {
-            drive_controller_input in = {0};
-            in.command_rad = 0.3f;
-            in.motor_angle_rad = (float)k * 0.05f;
-            in.motor_counts = (int32_t)(begin[n] + 33U * (uint32_t)k);
-            if (k == 0) {
-                drive_controller_start(&states[n], &in);
-            }
-            drive_controller_step(&states[n], &in, &out[n]);
-        }
-        if (out[0].voltage_V != out[1].voltage_V || out[0].flags != out[1].flags) {
-            (void)printf("tick %d: %g, %g", k, (double)out[0].voltage_V, (double)out[1].voltage_V);
-            return 1;
-        }
-    }
-    return (out[0].voltage_V == 0.0f) ? 2 : 0;
-}
-"""
 
 
 @pytest.mark.parametrize(("name", "angles"), [("joint", {"output_counts"}), ("ballscrew", set())])
@@ -248,31 +163,7 @@ def test_counts_of_the_encoder_go_round(speed: dict[str, Any], tmp_path: Path) -
     changes = {f"encoder.{key}": value for key, value in encoder.items()}
     written(tmp_path, load_design("ilr33-amber").with_values(changes), single=True)
     assert "motor_counts; /* count of the encoder; it may go round" in (tmp_path / "controller.h").read_text()
-    (tmp_path / "round.c").write_text(ROUND)
-    ran(tmp_path, "gcc", "-std=c99", *STRICT[:6], "round.c", "controller.c", "-o", "round")
-    ran(tmp_path, "./round")
-
-
-STAY = """#include "controller.h"
-int main(void)
-{
-    drive_controller_state state;
-    drive_controller_output out = {0};
-    drive_controller_input in = {0};
-    in.output_angle_rad = 0.5f;
-    in.output_counts = 41722; /* floor(0.5 * 524288/(2 pi)) */
-    in.motor_counts = 1234; /* an incremental encoder: of another zero */
-    in.command_rad = 0.5f;
-    drive_controller_start(&state, &in);
-    for (int k = 0; k < 400; k += 1) {
-        drive_controller_step(&state, &in, &out);
-        if (out.speed_command_rad_s > 0.5f || out.speed_command_rad_s < -0.5f) {
-            return 1;
-        }
-    }
-    return 0;
-}
-"""
+    said_by(tmp_path, PROGRAMS / "round.c")
 
 
 def test_firmware_with_a_sensor_at_the_output_stays_where_that_stands(tmp_path: Path) -> None:
@@ -280,9 +171,7 @@ def test_firmware_with_a_sensor_at_the_output_stays_where_that_stands(tmp_path: 
     written(tmp_path, load_design("joint"), single=True)
     assert "`output_counts / DRIVE_CONTROLLER_OUTPUT_COUNTS_PER_RAD`" in (tmp_path / "README.md").read_text()
     assert "output_counts; /* count of the encoder; it may not" in (tmp_path / "controller.h").read_text()
-    (tmp_path / "stay.c").write_text(STAY)
-    ran(tmp_path, "gcc", "-std=c99", *STRICT[:6], "stay.c", "controller.c", "-lm", "-o", "stay")
-    ran(tmp_path, "./stay")
+    said_by(tmp_path, PROGRAMS / "stay.c")
 
 
 def test_counts_of_a_linear_axis_are_told_by_the_metre(tmp_path: Path) -> None:

@@ -5,9 +5,11 @@ from dataclasses import dataclass
 from fractions import Fraction
 
 import numpy as np
-from mpmath import mp, mpc, mpf
+from flint import acb, acb_poly, arb, ctx, fmpq_poly
+from margin_truth import rationals
 
 _BITS = 700  # binary places of the recursion; what is cut off grows by no more than a few hundred of them
+_PRECISION = 300  # bits, of partial fractions
 
 
 @dataclass(frozen=True)
@@ -48,34 +50,25 @@ def sampled_figures(y: np.ndarray) -> Figures:
 
 
 class Continuous:
-    """Relative step response of num/den with simple poles, by partial fractions at 80 digits."""
+    """Relative step response of num/den with simple poles, by partial fractions about certified roots."""
 
     def __init__(self, num: np.ndarray, den: np.ndarray) -> None:
-        with mp.workdps(80):
-            b, a = [mpf(float(v)) for v in num], [mpf(float(v)) for v in den]
-            self.final = b[-1] / a[-1]
-            self.poles = mp.polyroots(a[::-1], maxsteps=400, extraprec=400, asc=True)
-            slope = [c * (len(a) - 1 - k) for k, c in enumerate(a[:-1])]
-            self.weights = [_at(b, p) / (p * _at(slope, p) * self.final) for p in self.poles]
+        above, below = (fmpq_poly(rationals(part[::-1])) for part in (num, den))
+        final = above[0] / below[0]
+        with ctx.workprec(_PRECISION):
+            self.poles = [acb(p) for p, _ in (below * below.denom()).numer().complex_roots()]
+            rest, slope = acb_poly(above / final), acb_poly(below.derivative())
+            self.weights = [rest(p) / (p * slope(p)) for p in self.poles]
 
     def __call__(self, t: float) -> float:
-        with mp.workdps(80):
-            total = sum(
-                (w * mp.exp(p * mpf(t)) for w, p in zip(self.weights, self.poles, strict=True)), mpc(1)
-            )
-            return float(total.real)
+        with ctx.workprec(_PRECISION):
+            terms = (w * (p * arb(t)).exp() for w, p in zip(self.weights, self.poles, strict=True))
+            return float(sum(terms, acb(1)).real.mid())
 
     def many(self, t: np.ndarray) -> np.ndarray:
         """In double precision, for a look at many times (poles far enough apart)."""
-        p, w = np.array(self.poles, dtype=complex), np.array(self.weights, dtype=complex)
+        p, w = (np.array([complex(each) for each in part]) for part in (self.poles, self.weights))
         return 1.0 + (np.exp(np.outer(t, p)) @ w).real
-
-
-def _at(p: list[mpf], x: mpc) -> mpc:
-    total = mpc(0)
-    for c in p:
-        total = total * x + c
-    return total
 
 
 def stable_poles(rng: np.random.Generator, most: int, sampled: bool) -> list[complex]:

@@ -208,8 +208,10 @@ def smallest(axis: Axis, distance: Distance, start: Place = NOWHERE, top: float 
             inside = zeros(axis, nearer, axis.edges(loop.lowest, end))
             if not inside:
                 break
-            found = [_least(axis, distance, float(a.mid()), float(b.mid())) for a, b in pairwise(inside)]
-            value, w = min((value, w), *found)
+            for a, b in pairwise(float(x.mid()) for x in inside):
+                near, accuracy = partial(_value, axis, distance), {"xatol": 1e-9 * b}
+                best = minimize_scalar(near, bounds=(a, b), method="bounded", options=accuracy)
+                value, w = min((value, w), (float(best.fun), float(best.x)))
         if value < level * at_end:
             return value, w
     return value, w
@@ -225,11 +227,3 @@ def _at_rest(axis: Axis, distance: Distance) -> Place:
 def _value(axis: Axis, distance: Distance, x: float) -> float:
     above, below = distance.over(*(complex(part) for part in axis.values(arb(x))))
     return abs(above) / abs(below) if below else math.inf
-
-
-def _least(axis: Axis, distance: Distance, low: float, high: float) -> Place:
-    """Smallest value between two places, and where."""
-    best = minimize_scalar(
-        partial(_value, axis, distance), bounds=(low, high), method="bounded", options={"xatol": 1e-9 * high}
-    )
-    return float(best.fun), float(best.x)

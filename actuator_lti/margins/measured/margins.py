@@ -235,16 +235,11 @@ def _phase_margins(
         low, high = (math.degrees(each) + 180.0 - turns for each in group.over(result.phase))
         known = (-180.0, 180.0) if high - low >= 360.0 else (low, high)
         out.append(PhaseMargin(deg - turns, between(omega, k, t), False, group.bracket(omega), known))
-        delays.append(_delay_range(known, group, omega))
+        first = between(omega, group.first, float(group.t0[0]))
+        last = between(omega, group.last, float(group.t1[-1]))  # a negative margin by way of a full turn
+        low, high = (math.radians(each + (360.0 if known[1] < 0.0 else 0.0)) for each in known)
+        delays.append((low / last, high / first) if low >= 0.0 else (0.0, 2.0 * math.pi / first))
     return tuple(out), delays, notes
-
-
-def _delay_range(deg: tuple[float, float], group: Group, omega: Real) -> tuple[float, float]:
-    """Range of the delay in s that uses up a phase margin; a negative one by way of a full turn."""
-    first = between(omega, group.first, float(group.t0[0]))
-    last = between(omega, group.last, float(group.t1[-1]))
-    low, high = (math.radians(each + (360.0 if deg[1] < 0.0 else 0.0)) for each in deg)
-    return (low / last, high / first) if low >= 0.0 else (0.0, 2.0 * math.pi / first)
 
 
 def _gain_margins(omega: Real, result: Bounds) -> tuple[tuple[GainMargin, ...], list[str]]:
