@@ -30,14 +30,7 @@ def rows(quick: bool = False) -> Iterable[Row]:
         for name, (arguments, times) in commands.items():
             taken = median_s(arguments, 1 if quick else times)
             note = f"median of {1 if quick else times}, wall clock, process start included"
-            yield Row(
-                group="cli",
-                name=f"actuator-lti {name}",
-                measured=taken,
-                unit="s",
-                target=TARGETS_S[name],
-                note=note,
-            )
+            yield Row(f"actuator-lti {name}", taken, "s", TARGETS_S[name], note=note)
     yield from start_rows(1 if quick else 7)
     yield from drawing_rows(quick)
     yield from static_rows(quick)
@@ -48,14 +41,7 @@ def start_rows(times: int) -> Iterable[Row]:
     for name, target in {"simulate": 1.0, "margins": 1.5}.items():
         taken = statistics.median(process_s([name, "ilr33-amber"]) for _ in range(times))
         note = f"median of {times}, user and system time of the whole process"
-        yield Row(
-            group="cli",
-            name=f"actuator-lti {name}, processor time",
-            measured=taken,
-            unit="s",
-            target=target,
-            note=note,
-        )
+        yield Row(f"actuator-lti {name}, processor time", taken, "s", target, note=note)
 
 
 def drawing_rows(quick: bool = False) -> Iterable[Row]:
@@ -72,15 +58,13 @@ def drawing_rows(quick: bool = False) -> Iterable[Row]:
     times = 1 if quick else 3
     note = f"{len(blocks)} figures, processor time, median of {times}"
     drawn = statistics.median(processor_s(lambda: draw_all(blocks)) for _ in range(times))
-    yield Row(group="cli", name="static figures of a report", measured=drawn, unit="s", target=1.5, note=note)
+    yield Row("static figures of a report", drawn, "s", 1.5, note=note)
     size = len(page(made)) / 1e6
-    yield Row(group="cli", name="page of a report", measured=size, unit="MB", target=2.5)
+    yield Row("page of a report", size, "MB", 2.5)
     again = processor_s(lambda: design_report(design, validation_sections(design)))
     whole = again + processor_s(lambda: page(made))
-    yield Row(
-        group="cli", name="whole report with validation", measured=whole, unit="s", target=3.0,
-        note="processor time beyond start-up, kernels compiled",
-    )  # fmt: skip
+    note = "processor time beyond start-up, kernels compiled"
+    yield Row("whole report with validation", whole, "s", 3.0, note=note)
 
 
 STATIC = {
@@ -104,10 +88,8 @@ def static_rows(quick: bool = False) -> Iterable[Row]:
         design = load_design(name).with_values(changes)
         taken = processor_s(partial(design_report, design))
         what = "".join(f", {key} = {value}" for key, value in changes.items())
-        yield Row(
-            group="cli", name=f"figures of a report without validation: {name}{what}", measured=taken,
-            unit="s", target=target, note="processor time beyond start-up",
-        )  # fmt: skip
+        note = "processor time beyond start-up"
+        yield Row(f"figures of a report without validation: {name}{what}", taken, "s", target, note=note)
 
 
 def process_s(arguments: Sequence[str]) -> float:

@@ -19,16 +19,8 @@ def rows() -> Iterator[Row]:
     found = firmware.closed(linear, small, "float")
     bound = firmware.bound_rad(linear, small, found)
     about = f"{TICKS} ticks of random commands"
-    yield Row(
-        group="firmware",
-        name=f"float, linear, {about}",
-        measured=found.difference_rad,
-        unit="rad",
-        target=bound,
-    )
+    yield Row(f"float, linear, {about}", found.difference_rad, "rad", bound)
     exact = firmware.closed(design, large, "double").difference_rad
-    yield Row(
-        group="firmware", name=f"double, all effects, {about}", measured=exact, unit="rad", target=1e-12
-    )
+    yield Row(f"double, all effects, {about}", exact, "rad", 1e-12)
     single = firmware.closed(design, large, "float").difference_rad
-    yield Row(group="firmware", name=f"float, all effects, {about}", measured=single, unit="rad")
+    yield Row(f"float, all effects, {about}", single, "rad")

@@ -11,7 +11,6 @@ from pathlib import Path
 
 from benchmarks.row import Row
 
-GROUP = "identification"
 EMPS = Path(__file__).resolve().parents[2] / "shared" / "data" / "emps" / "DATA_EMPS.mat"
 PEAK = """
 import re, sys
@@ -56,8 +55,8 @@ def _campaign(quick: bool) -> Iterable[Row]:
         result = identify_campaign(imported, design)
         done = time.perf_counter()
     what = f"{len(result.fit.points)} runs of {plan.duration_s:g} s at 1 kHz"
-    yield Row(group=GROUP, name=f"{what}, from files", measured=done - start, unit="s", target=5.0)
-    yield Row(group=GROUP, name=f"{what}, once read", measured=done - read, unit="s", target=5.0)
+    yield Row(f"{what}, from files", done - start, "s", 5.0)
+    yield Row(f"{what}, once read", done - read, "s", 5.0)
 
 
 def _intervals(drives: int) -> Iterable[Row]:
@@ -76,10 +75,8 @@ def _intervals(drives: int) -> Iterable[Row]:
         inside = 100.0 * float(np.mean(np.abs(errors) < 1.96))
         name = f"95 % intervals of {drives} random drives, {kind}"
         rms = float(np.sqrt(np.mean(np.square(errors))))
-        yield Row(
-            group=GROUP, name=name, measured=inside, unit="%", target=92.0, comparison=">=",
-            note=f"rms of error over stated error {rms:.2f}; wanted 92 to 98 % and 0.8 to 1.25",
-        )  # fmt: skip
+        note = f"rms of error over stated error {rms:.2f}; wanted 92 to 98 % and 0.8 to 1.25"
+        yield Row(name, inside, "%", 92.0, comparison=">=", note=note)
 
 
 def _emps() -> Row:
@@ -94,7 +91,7 @@ def _emps() -> Row:
     for form in ("symmetric", "per-direction"):
         fit_records(design, [emps], form=form)
     seconds = time.perf_counter() - start
-    return Row(group=GROUP, name="EMPS, both friction forms", measured=seconds, unit="s", target=1.0)
+    return Row("EMPS, both friction forms", seconds, "s", 1.0)
 
 
 def _streaming(quick: bool) -> Iterable[Row]:
@@ -109,15 +106,9 @@ def _streaming(quick: bool) -> Iterable[Row]:
         large, count = _peak_MB(path)
         seconds = time.perf_counter() - start
     name = f"CSV of {size / 1e9:g} GB"
-    yield Row(
-        group=GROUP, name=f"{name}: peak memory of the process", measured=large, unit="MB", target=600.0,
-        note=f"{count:.0f} rows, none lost",
-    )  # fmt: skip
-    yield Row(
-        group=GROUP, name=f"{name}: peak memory over that for a tenth of it", measured=large / small, unit="",
-        target=1.5,
-    )  # fmt: skip
-    yield Row(group=GROUP, name=f"{name}: time to read", measured=seconds, unit="s")
+    yield Row(f"{name}: peak memory of the process", large, "MB", 600.0, note=f"{count:.0f} rows, none lost")
+    yield Row(f"{name}: peak memory over that for a tenth of it", large / small, "", 1.5)
+    yield Row(f"{name}: time to read", seconds, "s")
 
 
 def _write_long(path: Path, size: int) -> None:

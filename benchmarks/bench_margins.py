@@ -49,13 +49,13 @@ def _beside(order: int, form: str, kind: str, seeds: range, repeats: int, target
         loops = [control.tf(loop) for loop in loops]
     pairs = [_times(loop, repeats) for loop in loops]
     ours, theirs = (statistics.median(pair[k] for pair in pairs) for k in (0, 1))
+    note = f"{1e3 * ours:.2f} ms against {1e3 * theirs:.2f} ms"
     return Row(
-        group="margins",
-        name=f"order {order}, {form}, {kind}: time over control.stability_margins",
-        measured=statistics.median(a / b for a, b in pairs),
-        unit="",
-        target=target,
-        note=f"{1e3 * ours:.2f} ms against {1e3 * theirs:.2f} ms",
+        f"order {order}, {form}, {kind}: time over control.stability_margins",
+        statistics.median(a / b for a, b in pairs),
+        "",
+        target,
+        note=note,
     )
 
 
@@ -67,14 +67,8 @@ def _certified(loop: control.StateSpace) -> object:
 def _row(name: str, loops: list[control.StateSpace], margins: Callable[..., object], allowed_s: float) -> Row:
     times = [_best(partial(margins, loop), 3) for loop in loops]
     kinds = [stability_margins(loop).evidence for loop in loops]
-    return Row(
-        group="margins",
-        name=f"{name}: time",
-        measured=1e3 * statistics.median(times),
-        unit="ms",
-        target=1e3 * allowed_s,
-        note=f"slowest {1e3 * max(times):.0f} ms; checked {kinds.count('checked')} of {len(kinds)}",
-    )
+    note = f"slowest {1e3 * max(times):.0f} ms; checked {kinds.count('checked')} of {len(kinds)}"
+    return Row(f"{name}: time", 1e3 * statistics.median(times), "ms", 1e3 * allowed_s, note=note)
 
 
 def _loop(seed: int, order: int, sampled: bool) -> control.StateSpace:

@@ -22,7 +22,6 @@ from reports.nightly.records import Result
 from reports.nightly.source import Study, read_study
 from reports.nightly.view import overview
 
-GROUP = "nightly"
 DESIGNS, FIGURES, NIGHTS, PAGES = 100, 200, 365, 10
 STUDY = """
 [study]
@@ -52,29 +51,20 @@ def history_rows(folder: Path, nights: int) -> Iterator[Row]:
     fill(history, nights)
     size = sum(p.stat().st_size for p in folder.rglob("*.json")) / 1e6
     what = f"{DESIGNS} designs, {FIGURES} figures, {nights} nights, all moving"
-    yield Row(group=GROUP, name=f"history on disk: {what}", measured=size, unit="MB", target=0.3 * nights)
+    yield Row(f"history on disk: {what}", size, "MB", 0.3 * nights)
     study = Study(name="bench", jobs=())
     change_points(np.arange(10.0), 0.1)  # imports what it needs
     history = open_history(folder)
     start = time.process_time()
     night = overview(history, Cache(folder / "cache"), study, folder)
     text = index(night, "nights/x")
-    yield Row(
-        group=GROUP,
-        name="index page from it",
-        measured=time.process_time() - start,
-        unit="s",
-        target=0.5,
-        note="processor time",
-    )
+    yield Row("index page from it", time.process_time() - start, "s", 0.5, note="processor time")
     start = time.process_time()
     for design in night.designs[:PAGES]:
         text += design_page(night, design, history, set())
     taken = (time.process_time() - start) / PAGES
-    yield Row(
-        group=GROUP, name="page of a design from it", measured=taken, unit="s", target=0.5,
-        note=f"processor time, mean of {PAGES} pages; the first reads every night",
-    )  # fmt: skip
+    note = f"processor time, mean of {PAGES} pages; the first reads every night"
+    yield Row("page of a design from it", taken, "s", 0.5, note=note)
 
 
 def fill(history: History, nights: int) -> None:
@@ -115,14 +105,10 @@ def study_rows(folder: Path, points: tuple[int, int]) -> Iterator[Row]:
     broken = night.count("broken")
     note = f"{broken} without result" if broken else "reports, validations and their comparison"
     name = f"{count} variants on 2 workers"
-    yield Row(
-        group=GROUP, name=f"{name}, first run", measured=times[0], unit="s", target=3.0 * count, note=note
-    )
-    yield Row(
-        group=GROUP, name=f"{name}, first run, processor time of all processes", measured=spent[0], unit="s",
-        target=6.0 * count, note="300 s on two free cores for 100 variants",
-    )  # fmt: skip
-    yield Row(group=GROUP, name=f"{name}, second run, unchanged", measured=times[1], unit="s", target=5.0)
+    yield Row(f"{name}, first run", times[0], "s", 3.0 * count, note=note)
+    note = "300 s on two free cores for 100 variants"
+    yield Row(f"{name}, first run, processor time of all processes", spent[0], "s", 6.0 * count, note=note)
+    yield Row(f"{name}, second run, unchanged", times[1], "s", 5.0)
 
 
 def processor_s() -> float:

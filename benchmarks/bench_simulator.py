@@ -23,7 +23,6 @@ from nonlinear._kernels import layout as at
 from nonlinear.native import parameters, resume
 
 Floats = npt.NDArray[np.float64]
-GROUP = "simulator"
 DURATION_S = 10.0
 FIRST_CALL = """
 import time
@@ -41,14 +40,14 @@ def rows(quick: bool = False) -> Iterator[Row]:
     best = seconds_of(row, 3 if quick else 20)
     yield from against_plain_c(3 if quick else 15)
     yield against_control(best)
+    note = f"{1e9 * best / row[at.TICKS]:.1f} ns a tick"
     yield Row(
-        group=GROUP,
-        name="real time over one core's time, 10 s run with history",
-        measured=DURATION_S / best,
-        unit="x",
-        target=2000.0,
+        "real time over one core's time, 10 s run with history",
+        DURATION_S / best,
+        "x",
+        2000.0,
         comparison=">=",
-        note=f"{1e9 * best / row[at.TICKS]:.1f} ns a tick",
+        note=note,
     )
     yield from wider_drives(PlainServo(load_design("ilr33-amber")), 1 if quick else 5)
     yield two_mass_with_play(best, quick)
@@ -125,13 +124,13 @@ def against_plain_c(repeats: int) -> Iterator[Row]:
         here, *there = np.array(turns).min(axis=0)
         run = f"{size_deg:g} deg {frequency_hz:g} Hz {load_Nm:g} N m"
         for peers, time_s in zip(("", " with its command"), there, strict=True):
+            note = f"{1e9 * here / ticks:.1f} ns a tick, C {1e9 * time_s / ticks:.1f}"
             yield Row(
-                group=GROUP,
-                name=f"time over that of a plain C program{peers}, {run}",
-                measured=float(here / time_s),
-                unit="x",
-                target=1.2,
-                note=f"{1e9 * here / ticks:.1f} ns a tick, C {1e9 * time_s / ticks:.1f}",
+                f"time over that of a plain C program{peers}, {run}",
+                float(here / time_s),
+                "x",
+                1.2,
+                note=note,
             )
 
 
@@ -144,14 +143,14 @@ def _with_command(peer: PlainServo, design: Design, command: commands.Command, l
 def against_control(best: float) -> Row:
     """The same cascade as python-control nonlinear systems."""
     slow = seconds_per_second(load_design("ilr33-amber"), 4.0)
+    note = f"control: {slow:.0f} s for a simulated second, from its first 20 ms"
     return Row(
-        group=GROUP,
-        name="speed over control.input_output_response (RK45, rtol 1e-6)",
-        measured=slow / (best / DURATION_S),
-        unit="x",
-        target=3000.0,
+        "speed over control.input_output_response (RK45, rtol 1e-6)",
+        slow / (best / DURATION_S),
+        "x",
+        3000.0,
         comparison=">=",
-        note=f"control: {slow:.0f} s for a simulated second, from its first 20 ms",
+        note=note,
     )
 
 
@@ -181,10 +180,10 @@ def wider_drives(peer: PlainServo, repeats: int) -> Iterator[Row]:
         turns = [[seconds_of(row, repeats), best_of(partial(peer.run, *given), repeats)] for _ in range(3)]
         tick_s, plain_s = np.array(turns).min(axis=0) / (count, ticks)
         what = f"{name}{filters}{', with energies' if energy else ''}"
+        note = f"{1e9 * tick_s:.1f} ns, C {1e9 * plain_s:.1f}"
         yield Row(
-            group=GROUP, name=f"time a tick of {what} over the plain C program's", measured=tick_s / plain_s,
-            unit="x", target=target, note=f"{1e9 * tick_s:.1f} ns, C {1e9 * plain_s:.1f}",
-        )  # fmt: skip
+            f"time a tick of {what} over the plain C program's", tick_s / plain_s, "x", target, note=note
+        )
 
 
 def _filtered(design: Design) -> Design:
@@ -208,13 +207,13 @@ def two_mass_with_play(best: float, quick: bool) -> Row:
     rows.sine("command", np.radians(5.0), 1.0)
     row = rows.values[0]
     taken, out = seconds_of(row, 2 if quick else 8), run(row, *room(row))
+    note = f"{1e9 * taken / row[at.TICKS]:.1f} ns a tick, {out[at.OUT_STATE + at.S_EVENTS]:.0f} events"
     return Row(
-        group=GROUP,
-        name="two masses with play and both sides' friction over the baseline, time a tick",
-        measured=taken / best,
-        unit="x",
-        target=4.0,
-        note=f"{1e9 * taken / row[at.TICKS]:.1f} ns a tick, {out[at.OUT_STATE + at.S_EVENTS]:.0f} events",
+        "two masses with play and both sides' friction over the baseline, time a tick",
+        taken / best,
+        "x",
+        4.0,
+        note=note,
     )
 
 
@@ -225,15 +224,8 @@ def two_threads(quick: bool) -> Row:
     batch.sine("command", np.linspace(0.001, 0.1, 1000), 3.0)
     pairs = [[best_of(partial(batch.run, threads=n), 1, time.perf_counter) for n in (1, 2)] for _ in range(3)]
     one, two = np.array(pairs).min(axis=0)
-    return Row(
-        group=GROUP,
-        name="two threads over one, batch of 1000",
-        measured=float(one / two),
-        unit="x",
-        target=1.8,
-        comparison=">=",
-        note=f"two plain processes gain {machine_gain():.2f} on this machine now",
-    )
+    note = f"two plain processes gain {machine_gain():.2f} on this machine now"
+    return Row("two threads over one, batch of 1000", float(one / two), "x", 1.8, comparison=">=", note=note)
 
 
 def machine_gain() -> float:
@@ -265,13 +257,9 @@ def constant_cost(quick: bool) -> Iterator[Row]:
         row[at.TICKS] = ticks
         work = partial(run, row, np.empty((0, 0)), np.empty(0, np.uint16))
         costs.append(best_of(work, 50 if ticks <= 10**6 else 1) / ticks)
+    note = ", ".join(f"{1e9 * c:.1f}" for c in costs) + " ns"
     yield Row(
-        group=GROUP,
-        name="dearest over cheapest cost per tick, 1e4 to 1e8 ticks",
-        measured=max(costs) / min(costs),
-        unit="x",
-        target=1.25,
-        note=", ".join(f"{1e9 * c:.1f}" for c in costs) + " ns",
+        "dearest over cheapest cost per tick, 1e4 to 1e8 ticks", max(costs) / min(costs), "x", 1.25, note=note
     )
 
 
@@ -280,4 +268,4 @@ def first_call() -> Row:
     done = subprocess.run([sys.executable, "-c", FIRST_CALL], capture_output=True, text=True, check=True)
     wall, cpu = (float(word) for word in done.stdout.split())
     note = f"{cpu:.2f} s of processor time"
-    return Row(group=GROUP, name="first call of a process", measured=wall, unit="s", target=1.0, note=note)
+    return Row("first call of a process", wall, "s", 1.0, note=note)

@@ -18,8 +18,6 @@ import numpy as np
 
 from benchmarks.row import Row
 
-GROUP = "studies"
-
 
 def rows(quick: bool = False) -> Iterator[Row]:
     """Measure, warm: compiled code is in its cache."""
@@ -71,10 +69,11 @@ def _margins(quick: bool) -> Iterator[Row]:
             worst = max(worst, _difference(figures, name, k, stability_margins(loop.open_loop)))
     ratio = (loop_s / compared) / (batch_s / count)
     note = f"{1e3 * loop_s / compared:.1f} ms a design against {1e6 * batch_s / count:.0f} us, two threads"
-    yield Row(group=GROUP, name=f"margins of {count} designs: faster than one by one", measured=ratio,
-              unit="x", target=100.0, comparison=">=", note=note)  # fmt: skip
-    yield Row(group=GROUP, name="largest relative difference to the margin engine", measured=worst, unit="",
-              target=1e-6, note=f"every crossover of {compared} designs")  # fmt: skip
+    yield Row(
+        f"margins of {count} designs: faster than one by one", ratio, "x", 100.0, comparison=">=", note=note
+    )
+    note = f"every crossover of {compared} designs"
+    yield Row("largest relative difference to the margin engine", worst, "", 1e-6, note=note)
 
 
 def _two_mass(quick: bool) -> Iterator[Row]:
@@ -102,7 +101,7 @@ def _two_mass(quick: bool) -> Iterator[Row]:
             best.append(min(seconds) / count)
         note = f"{1e6 * best[1]:.0f} us a design against {1e6 * best[0]:.0f} us"
         name = f"a two-mass drive over the rigid one, {words}"
-        yield Row(group=GROUP, name=name, measured=best[1] / best[0], unit="x", target=3.0, note=note)
+        yield Row(name, best[1] / best[0], "x", 3.0, note=note)
 
 
 def _difference(figures: Any, loop: str, k: int, truth: Any) -> float:
@@ -135,7 +134,7 @@ def _monte_carlo(quick: bool) -> Iterator[Row]:
         settings = MonteCarloSettings(samples=count, step=step, worst_cases=False, chunk=512)
         with tempfile.TemporaryDirectory() as folder:
             seconds, _ = _timed(lambda f=folder, s=settings: monte_carlo(design, f, s))  # type: ignore[misc]
-        yield Row(group=GROUP, name=f"{count} {name}", measured=seconds, unit="s", target=target * share)
+        yield Row(f"{count} {name}", seconds, "s", target * share)
     yield _steps(count, share)
 
 
@@ -159,8 +158,7 @@ def _steps(count: int, share: float) -> Row:
 
     with ThreadPoolExecutor(2) as pool:
         seconds, _ = _timed(lambda: list(pool.map(part, range(0, count, 250))))
-    return Row(group=GROUP, name=f"{count} nonlinear steps of 0.5 s", measured=seconds, unit="s",
-               target=15.0 * share)  # fmt: skip
+    return Row(f"{count} nonlinear steps of 0.5 s", seconds, "s", 15.0 * share)
 
 
 def _growth(quick: bool) -> Iterator[Row]:
@@ -177,10 +175,8 @@ def _growth(quick: bool) -> Iterator[Row]:
             taken.append(_timed(lambda f=folder, s=settings: monte_carlo(design, f, s))[0])  # type: ignore[misc]
         peaks.append(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0)
     name = f"{10 * few} samples against {few}"
-    yield Row(group=GROUP, name=f"{name}: time over ten times", measured=taken[1] / taken[0] / 10,
-              unit="x", target=1.2, note=f"{taken[1]:.1f} s")  # fmt: skip
-    yield Row(group=GROUP, name=f"{name}: more memory", measured=peaks[1] - peaks[0],
-              unit="MB", target=100.0, note=f"peak {peaks[1]:.0f} MB")  # fmt: skip
+    yield Row(f"{name}: time over ten times", taken[1] / taken[0] / 10, "x", 1.2, note=f"{taken[1]:.1f} s")
+    yield Row(f"{name}: more memory", peaks[1] - peaks[0], "MB", 100.0, note=f"peak {peaks[1]:.0f} MB")
 
 
 def _dask(quick: bool) -> Iterator[Row]:
@@ -213,8 +209,8 @@ def _dask(quick: bool) -> Iterator[Row]:
         taken = [[run(engine) for engine in engines] for _ in range(2)]
     here, there = (min(pair) for pair in zip(*taken, strict=True))
     overhead = 100.0 * (there / here - 1.0)
-    yield Row(group=GROUP, name=f"Dask, 2 workers, {count} samples: overhead", measured=overhead, unit="%",
-              target=15.0, note=f"{there:.1f} s against {here:.1f} s in this process")  # fmt: skip
+    note = f"{there:.1f} s against {here:.1f} s in this process"
+    yield Row(f"Dask, 2 workers, {count} samples: overhead", overhead, "%", 15.0, note=note)
 
 
 def _tuning() -> Iterator[Row]:
@@ -222,5 +218,5 @@ def _tuning() -> Iterator[Row]:
     from analyses.tuning import tune
 
     seconds, result = _timed(lambda: tune(load_design("ilr33-amber")))
-    yield Row(group=GROUP, name="tuning of the baseline with its trade-off curve", measured=seconds, unit="s",
-              note=f"{result.evaluations} designs, {result.corners} corners")  # fmt: skip
+    note = f"{result.evaluations} designs, {result.corners} corners"
+    yield Row("tuning of the baseline with its trade-off curve", seconds, "s", note=note)

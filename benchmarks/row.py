@@ -6,11 +6,10 @@ from dataclasses import dataclass
 from typing import Literal
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class Row:
     """A measured figure beside its target; ``comparison`` says which side of the target is good."""
 
-    group: str
     name: str
     measured: float
     unit: str

@@ -165,14 +165,11 @@ class Rows(Compared):
         tables = self.tables.joined()
         result = run_rows(self.values, tables, threads=threads, progress=progress, drives=drives)
         if self.design.controller.position is None and drives is None:
-            for k in np.flatnonzero(self["step_target"]):
-                result.outs[k, at.OUT_STEP : at.OUT_STEP + at.STEP_SIZE] = self._step_of(int(k))
+            for k in np.flatnonzero(self["step_target"]):  # what the kernel takes of an output's angle
+                followed = self.trajectory(int(k)).followed / self["step_target"][k]
+                numbers = step_numbers(followed, float(self["step_band"][k]))
+                result.outs[k, at.OUT_STEP : at.OUT_STEP + at.STEP_SIZE] = numbers
         return result
-
-    def _step_of(self, k: int) -> Floats:
-        """Of a drive that follows no angle the numbers that the kernel takes of an output's step."""
-        run = replace(self.trajectory(k), ratio=float(self["ratio"][k]))
-        return step_numbers(run.followed / self["step_target"][k], float(self["step_band"][k]))
 
     def running(self, k: int = 0) -> Running:
         """One row at its start, to go on from piece by piece."""

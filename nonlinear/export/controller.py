@@ -3,10 +3,11 @@
 import hashlib
 import re
 from functools import partial
+from struct import calcsize
 
 from actuator_lti.compiled.kinds import c_float
 from actuator_lti.compiled.program import Program
-from actuator_lti.compiled.structs import Member, Struct, struct_text
+from actuator_lti.compiled.structs import Member, struct_text
 from actuator_lti.design.loader import AnyDesign, as_design
 from actuator_lti.design.writing import design_hash
 from actuator_lti.start.extras import package_version
@@ -44,7 +45,7 @@ def controller_export(
         "DESIGN_HASH": design_hash(design), "REAL": "float" if single_precision else "double",
         "PRECISION": "single" if single_precision else "double",
         "CONSTANTS": _constants(ours, prefix.upper()), "FLAGS": _flags(prefix.upper()),
-        "STRUCTS": _structs(ours), "SIZES": _sizes(ours, single_precision),
+        "STRUCTS": _structs(ours), "SIZES": _sizes(ours, "f" if single_precision else "d"),
         "DECLARATIONS": _declarations(ours.program), "ANGLES": _angles(ours, prefix.upper()),
         "ROUNDINGS": str(roundings(ours)),
         "SOURCE_HASH": hashlib.sha256(source.encode()).hexdigest(),
@@ -139,16 +140,12 @@ def _angles(ours: Controller, upper: str) -> str:
     )
 
 
-def _sizes(ours: Controller, single_precision: bool) -> str:
-    named = (("state", ours.state), ("input", ours.measured), ("output", ours.out))
-    return ", ".join(f"{text} {_size(struct, 4 if single_precision else 8)} bytes" for text, struct in named)
-
-
-def _size(struct: Struct, real: int) -> int:
-    """Bytes of a structure in C, with what is left free before a wider member and at the end."""
-    end, widest = 0, 1
-    for each in struct.members:
-        one = real if each.kind == "float" else 4
-        end += -end % one + max(each.length, 1) * one
-        widest = max(widest, one)
-    return end + -end % widest
+def _sizes(ours: Controller, real: str) -> str:
+    """Bytes of each structure in C, with what is left free before a wider member and at the end."""
+    texts = []
+    for text, struct in (("state", ours.state), ("input", ours.measured), ("output", ours.out)):
+        codes = [(max(each.length, 1), real if each.kind == "float" else "i") for each in struct.members]
+        widest = max((code for _, code in codes), key=calcsize, default="i")
+        size = calcsize("".join(f"{count}{code}" for count, code in codes) + f"0{widest}")
+        texts.append(f"{text} {size} bytes")
+    return ", ".join(texts)

@@ -158,8 +158,8 @@ def _of_key(key: Key, reference: int, causality: Causality, variability: str) ->
 def structured(path: str) -> str:
     """A dotted path in FMI's structured naming: numbers as indices, other names quoted.
 
-    >>> structured("control.velocity.filter.1.depth")
-    'control.velocity.filter[1].depth'
+    >>> structured("control.velocity.filter.1.depth"), structured("gear.my stage.ratio")
+    ('control.velocity.filter[1].depth', "gear.'my stage'.ratio")
     """
     indexed = re.sub(r"\.(\d+)(?=\.|$)", r"[\1]", path)
     parts = [

@@ -18,11 +18,16 @@ from programs import executed
 from actuator_lti.compiled.compiler import compile_files, zig_command
 from actuator_lti.design import Design, load_design, parameter_value, paths_of, with_values
 from nonlinear import commands, loads, simulate
+from nonlinear._kernels import layout as at
+from nonlinear._kernels.start import derive, prepare_sizes, retune
 from nonlinear.export import fmu_bytes
+from nonlinear.export.c_files import exported_row, spare_parameters
 from nonlinear.export.trace import trace_keys
 from nonlinear.export.variables import structured
+from nonlinear.native import parameters, tick
 from nonlinear.row.parameters import design_row
 
+validation = pytest.importorskip("fmpy.validation")
 OUTPUTS = ["output.angle", "motor.speed", "motor.current", "motor.voltage"]
 
 
@@ -45,13 +50,11 @@ def assert_same(result: Any, design: Design, command: float, load: float, every:
 @needs_compiler
 @pytest.mark.parametrize("name", ["ilr33-amber", "joint", "ballscrew", "fin", "ilr33-amber-compliant"])
 def test_units_are_valid_and_give_the_simulators_bits(name: str, tmp_path) -> None:
-    from fmpy.validation import validate_fmu
-
     design = load_design(name)
     step = design.controller.period_s
     for version in (2, 3):
         path = written(tmp_path, design, version)
-        assert validate_fmu(str(path)) == []
+        assert validation.validate_fmu(str(path)) == []
         for size, load, every in ((0.05, 0.0, 1), (0.01, 0.1, 1), (0.02, 3.0, 5)):
             start = {"command": size, "hinge_moment": load}
             assert_same(run(path, every * step, 500 * step, start), design, size, load, every)
@@ -149,11 +152,6 @@ def test_own_host_saves_serialises_and_goes_on(step: float, save_at: int, tmp_pa
 ])  # fmt: skip
 def test_tuning_between_steps_changes_what_follows(name: str, change: dict[str, float], tmp_path) -> None:
     """Keys changed during the run: as if the simulator had been stopped and gone on with the other row."""
-    from nonlinear._kernels import layout as at
-    from nonlinear._kernels.start import derive, prepare_sizes, retune
-    from nonlinear.export.c_files import exported_row, spare_parameters
-    from nonlinear.native import parameters, tick
-
     design = load_design(name)
     values = {path: parameter_value(design, path) * factor for path, factor in change.items()}
     path = written(tmp_path, design)
@@ -223,8 +221,3 @@ def test_command_writes_the_report_and_the_licence_into_it(tmp_path, cli) -> Non
     with zipfile.ZipFile(tmp_path / "d.fmu") as archive:
         assert b"<html" in archive.read("documentation/index.html")
         assert b"MIT License" in archive.read("documentation/licenses/license.txt")
-
-
-def test_a_quoted_name_is_structured() -> None:
-    assert structured("gear.my stage.ratio") == "gear.'my stage'.ratio"
-    assert structured("control.velocity.filter.2.depth") == "control.velocity.filter[2].depth"

@@ -1,6 +1,8 @@
 """What a host may ask of the unit, and when: order of calls, types, keys that go together, log, states."""
 
 import re
+import zipfile
+from ctypes import c_char_p
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -76,8 +78,6 @@ def test_the_log_can_be_turned_off_by_its_category(unit: Path) -> None:
         fmi3 = unit.name == "drive3.fmu"
 
         def log(on: bool, *names: str) -> Any:
-            from ctypes import c_char_p
-
             given = (c_char_p * len(names))(*(name.encode() for name in names))
             known = host.unit.fmi3SetDebugLogging if fmi3 else host.unit.fmi2SetDebugLogging
             return known(host.unit.component, on, len(names), given)
@@ -214,8 +214,6 @@ def test_two_units_interleave_and_each_goes_back(unit: Path) -> None:
 
 @pytest.mark.skipif(zig_command() is None, reason="ziglang is not installed")
 def test_the_linux_binary_needs_no_newer_glibc_than_2_17(unit: Path) -> None:
-    import zipfile
-
     with zipfile.ZipFile(unit) as archive:
         (name,) = [name for name in archive.namelist() if name.endswith(".so")]
         needed = {tuple(map(int, v.split(b"."))) for v in re.findall(rb"GLIBC_([\d.]+)", archive.read(name))}

@@ -1,8 +1,4 @@
-"""The unit at any step of its host: inputs from the tick on that follows, outputs at the communication point.
-
-The truth between ticks is the same plant run without its controller on ticks ten times as fine, under the
-voltages that the plain run has recorded.
-"""
+"""The unit at any step of its host: inputs from the next tick on, outputs at the communication point."""
 
 from dataclasses import replace
 from math import inf

@@ -152,10 +152,7 @@ def drive(seed: int, ticks: int = 400) -> tuple[dict[str, Any], np.ndarray]:
 
 @needs_node
 def test_instances_interleave_have_the_simulators_motion_and_go_back(tmp_path) -> None:
-    """One module, five designs in turns; the last is saved, runs ahead, and goes back twice to the same bits.
-
-    Another C library's exp, sin, log: 1e-9 of the largest value.
-    """
+    """Five designs in turns, to 1e-9 (another C library's exp); the last is saved and goes back twice."""
     units, motions = zip(*map(drive, (-1, 0, 2, 3, 1)), strict=True)
     done = in_node("wasm_host.mjs", tmp_path, units=units, at=AT, keep=150)
     for theirs, ours in zip(done["rows"], motions, strict=True):

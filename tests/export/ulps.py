@@ -1,8 +1,4 @@
-"""How far the figures of a loop move where each value of its drive moves by one unit in the last place.
-
-Two writings of the same drive differ by the rounding of their entries. Figures that differ by no more than
-such a nudge moves them differ by rounding; beyond that one of the two writings is wrong.
-"""
+"""How far figures of a loop move where values of its drive move by an ulp: so far two writings may differ."""
 
 from functools import lru_cache
 
@@ -18,11 +14,8 @@ TIMES = ("rise_time", "settling_time")
 
 @lru_cache(maxsize=1)
 def moved_by_an_ulp(design: Design, loop: str) -> dict[str, float]:
-    """The largest change of each figure over copies, every value but whole numbers -1, 0 or 1 ulp beside.
-
-    A time is a whole number of ticks, which hide what moves it by less: it moves with the slowest pole's time
-    constant at least.
-    """
+    """The largest change of each figure over copies, every value but whole numbers -1, 0 or 1 ulp beside."""
+    # a time is of whole ticks, which hide what moves it by less: it moves with the slowest pole's at least
     rng = np.random.default_rng(0)
     known = {path: parameter_value(design, path) for path in variable_paths(design)}
     ulps = {path: np.spacing(x) for path, x in known.items() if np.isfinite(x) and x != round(x)}

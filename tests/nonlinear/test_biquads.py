@@ -64,10 +64,7 @@ def test_an_identity_is_no_filter(b: Any, a: Any, place: str) -> None:
 @pytest.mark.parametrize("place", ["torque", "speed"])
 @pytest.mark.parametrize(("b", "a"), FILTERS)
 def test_the_velocity_loop_has_the_filter_as_factor(b: Any, a: Any, place: str) -> None:
-    """At the velocity period the loop is the loop without the filter times H(z), in every form.
-
-    In the ideal one by the inverse of Tustin's rule, s = (2/T) j tan(angle/2).
-    """
+    """The loop is that without the filter times H(z), in the ideal form at s = (2/T) j tan(angle/2)."""
     drives = amber(), amber(Filter(kind="biquad", on=place, b=b, a=a))
     for form in ("sampled", "ideal"):
         plain, filtered = (assemble_loops(each, form=form).velocity for each in drives)

@@ -1,5 +1,6 @@
 """`actuator-lti simulate`: commands, loads, records mean what they say, in the outermost stage's unit."""
 
+from dataclasses import dataclass
 from math import exp, radians
 from pathlib import Path
 from typing import Any
@@ -12,8 +13,29 @@ from actuator_lti import load_design, write_design
 from actuator_lti.design.model import Friction
 from analyses.motion.asked import OF
 from tests.changed import changed
+from tests.command_line import Command
 
 TS = 1e-4
+
+
+@dataclass(frozen=True)
+class Simulate:
+    """Run `simulate` with these words: the facts of --json, the rows of --csv."""
+
+    cli: Command
+    path: Path
+
+    def __call__(self, words: str) -> tuple[dict[str, Any], np.ndarray]:
+        facts = self.cli.data("simulate", *words.split(), "--csv", self.path)
+        return facts, np.genfromtxt(self.path, delimiter=",", names=True)
+
+    def refused(self, words: str) -> str:
+        return self.cli.refused("simulate", *words.split(), "--csv", self.path)
+
+
+@pytest.fixture
+def run(tmp_path, cli) -> Simulate:
+    return Simulate(cli, tmp_path / "run.csv")
 
 
 def table(path: Path, head: str, *columns: Any) -> Path:

@@ -180,10 +180,8 @@ def test_a_worm_before_a_chain_is_accepted_and_the_last_gear_is_meant_where_noth
 
 @pytest.mark.parametrize(("load_Nm", "point"), [(4.0, "driving"), (-4.0, "driven")])
 def test_the_motor_feels_the_load_as_friction_only(load_Nm: float, point: str) -> None:
-    """At a constant speed T_s = -M/N_r, and kM i = C0 + CM N_r |T_s| + Cv w = C0 + CM |M| + Cv w.
-
-    Of the linear one dw/dt = ... -+ CM N_r k twist/J_m, by the side on which the coupling is pressed.
-    """
+    """At a constant speed T_s = -M/N_r, and kM i = C0 + CM N_r |T_s| + Cv w = C0 + CM |M| + Cv w."""
+    # the linear one has dw/dt = ... -+ CM N_r k twist/J_m, by the side on which the coupling is pressed
     design, rate = steering(), radians(5.0)
     run = simulate(design, commands.ramp(rate_rad_s=rate), 1.0, load_Nm=load_Nm)
     friction, kM = design.friction, design.motor.torque_constant_Nm_A

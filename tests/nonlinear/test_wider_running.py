@@ -99,10 +99,8 @@ def test_supply(supply: model.Supply) -> None:
 
 @pytest.mark.parametrize(("amperes", "peak_s"), [(5.0, 0.0), (9.0, 1.0)])
 def test_the_overload_protection_is_not_called_the_current_limit(amperes: float, peak_s: float) -> None:
-    """Demand below the peak: the peak never acts; above it: until the protection takes over after 1 s.
-
-    Thermal: x = (i/i_c)^2 (1 - exp(-t/tau)) reaches 1; tau from one second at three times i_c.
-    """
+    """Demand below the peak: the peak never acts; above it: until the protection takes over after 1 s."""
+    # thermal: x = (i/i_c)^2 (1 - exp(-t/tau)) reaches 1; tau from one second at three times i_c
     protected = {"peak_current_A": 6.0, "continuous_current_A": 2.0, "peak_time_s": 1.0}
     design = torque_drive(GAIN, 1e-3, voltage_V=inf, **protected)
     design = changed(design, friction={"dry_torque_Nm": 10.0})  # the rotor stays
