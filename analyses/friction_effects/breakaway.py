@@ -97,7 +97,7 @@ def threshold(design: Design, load_Nm: float) -> Threshold | None:
     friction = design.friction
     at_zero = replace(  # its own torque there an offset, no friction behind the spring
         design,
-        motor=design.motor.level(),
+        motor=design.motor.straight(),
         load=replace(design.load.level(), friction=None),
         friction=replace(friction, offset_torque_Nm=friction.offset_torque_Nm + holding_torque_Nm(design)),
     )

@@ -188,7 +188,7 @@ class Capability:
 
 def capability(design: Design, load_Nm: float, settling_s: float) -> Capability:
     """Run away from the output, behind the profile, at one load: without what depends on the angle."""
-    design = replace(design, command=Command(), load=design.load.level(), motor=design.motor.level())
+    design = replace(design, command=Command(), load=design.load.level(), motor=design.motor.straight())
     figures = drive_figures(design, load_Nm)
     rate, push = figures.output_rate_rad_s, figures.acceleration_rad_s2
     current, continuous = figures.motor_current_A, design.limits.continuous_current_A
