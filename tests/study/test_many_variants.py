@@ -141,7 +141,6 @@ def test_the_terminal_shows_every_design_by_its_own_name(columns, cli, monkeypat
     out = cli.text("compare", "joint", *sets, "--no-validate", "--out", tmp_path, status=1)
     loops = " ".join(out.partition("Loops")[2].split())
     assert "Loops, continued" in loops
-    assert out.count(" Figure") == loops.count("Loops, continued") + 1
     assert all("joint" in part for part in loops.split("Loops, continued"))  # the base, in each of them
     assert [gain for gain in gains if gain.rpartition("=")[2].split()[0] not in loops] == []
     assert "47 v" not in loops
