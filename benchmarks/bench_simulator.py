@@ -201,11 +201,7 @@ def two_mass_with_play(best: float, quick: bool) -> Row:
     coupling = Coupling(stiffness_Nm_rad=stiffness, damping_Nms_rad=0.01, play_rad=float(play))
     friction = LoadFriction(dry_torque_Nm=0.2, viscous_Nms_rad=0.05)
     load = replace(rigid.load, inertia_kgm2=5e-3, friction=friction)
-    rows = Rows.of(replace(rigid, coupling=coupling, load=load))
-    rows["ticks"] = round(DURATION_S / rows.value("period"))
-    rows["load"] = 4.0
-    rows.sine("command", np.radians(5.0), 1.0)
-    row = rows.values[0]
+    row = sawtooth(replace(rigid, coupling=coupling, load=load)).values[0]
     taken, out = seconds_of(row, 2 if quick else 8), run(row, *room(row))
     note = f"{1e9 * taken / row[at.TICKS]:.1f} ns a tick, {out[at.OUT_STATE + at.S_EVENTS]:.0f} events"
     return Row(

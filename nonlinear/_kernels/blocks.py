@@ -1,7 +1,4 @@
-"""Building blocks of a controller: sections of second order, PI with its anti-windup, a law of one's own,
-the measured speed, and
-an instrument that adds a signal, multiplies the gain, delays, and notes before and after.
-"""
+"""Blocks of a controller: sections, PI with anti-windup, own law, measured speed; an instrument, `probe`."""
 
 import math
 
@@ -18,10 +15,7 @@ IDEAL, DIFFERENCE, TRACKING = range(3)
 
 
 def chain(p, at, count, s, to, x):
-    """Pass x through ``count`` sections (direct form II transposed).
-
-    Coefficients b0, b1, b2, a1, a2 of each section begin at ``p[at]``, its two states at ``s[to]``.
-    """
+    """Pass x through sections (direct form II transposed): coefficients from p[at], states from s[to] on."""
     for n in range(count):
         o, q = at + n * layout.SECTION, to + 2 * n
         y = p[o] * x + s[q]
@@ -49,11 +43,7 @@ def clamp(value, limit):
 
 
 def pi(e, integral, gain, step, limit):
-    """PI with conditional integration: output, new integral, and 1 where the limit acts.
-
-    ``step`` is Kp T/Tn.  The new integral is kept if the output is not clamped or v and e have opposite
-    signs; otherwise the old one is, and the output is formed with it.
-    """
+    """PI with conditional integration: output, new integral, 1 where the limit acts; ``step`` is Kp T/Tn."""
     updated = integral + step * e
     v = gain * e + updated
     out = clamp(v, limit)
@@ -65,13 +55,8 @@ def pi(e, integral, gain, step, limit):
 
 
 def regulator(e, integral, gain, step, extra, limit, law, tracking):
-    """PI with a feed-forward ``extra`` and any anti-windup law; the same three numbers as `pi`.
-
-    The limit acts where it clamps the output, and by law 1 where it clamps the integral.
-
-    ``law`` 0: as there, with v = Kp e + I' + extra.  1: I' = clamp(I + Kp T/Tn e).  2, back-calculation:
-    I' = I + Kp T/Tn e + (T/Tt)(out - v), ``tracking`` being T/Tt.
-    """
+    """`pi` with a feed-forward ``extra`` and any anti-windup law; ``tracking`` is T/Tt."""
+    # the limit acts where it clamps the output, and by the law `CLAMPED` where it clamps the integral
     updated = integral + step * e
     kind, held = int(law), 0.0
     if kind == CLAMPED:
@@ -92,10 +77,8 @@ def regulator(e, integral, gain, step, extra, limit, law, tracking):
 
 
 def probe(p, s, io, point, value):
-    """Signal after the probe at ``point``: gain times the delayed value plus the injected signal.
-
-    The past values lie in a ring of the state, one for each point.
-    """
+    """Signal behind the probe at a point: gain times the delayed value plus what is injected."""
+    # past values lie in a ring of the state, one for each point
     at = layout.PROBES + point * layout.PROBE_SIZE
     taps = int(p[at + layout.PROBE_TAPS])
     passed = value

@@ -3,27 +3,7 @@
 It is a function of its own: with measurements written into ``io`` it runs without the motor's model.
 """
 
-from nonlinear._kernels import layout
-from nonlinear._kernels.blocks import (
-    PROBE_Y,
-    chain,
-    clamp,
-    counted,
-    measured_speed,
-    own_output,
-    own_states,
-    pi,
-    regulator,
-)
-from nonlinear._kernels.position import (
-    limited,
-    outer_rare,
-    probed_output,
-    put_current,
-    put_outer,
-    put_voltage,
-    sloped,
-)
+from nonlinear._kernels import blocks, layout, position
 
 KERNELS = True
 
@@ -44,18 +24,18 @@ def overload(p, s, i):
 def outer(p, s, io, th):
     """Update the outermost stage."""
     if p[layout.RARE_COMMAND] > 0.0:
-        outer_rare(p, s, io, th)
+        position.outer_rare(p, s, io, th)
         return
     N, y = p[layout.RATIO], th
-    if p[PROBE_Y] > 0.0:
-        y = N * probed_output(p, s, io, th / N)
-    out, flags = limited(p, s, p[layout.POSITION_GAIN] * (N * io[layout.IN_COMMAND] - y))
-    put_outer(p, s, io, out, flags)
+    if p[blocks.PROBE_Y] > 0.0:
+        y = N * position.probed_output(p, s, io, th / N)
+    out, flags = position.limited(p, s, p[layout.POSITION_GAIN] * (N * io[layout.IN_COMMAND] - y))
+    position.put_outer(p, s, io, out, flags)
 
 
 def torque_path(p, s, e, limit):
     """Velocity controller with feed-forward: clamp with the anti-windup, filters, clamp again."""
-    out, integral, hit = regulator(
+    out, integral, hit = blocks.regulator(
         e, s[layout.S_VELOCITY_INTEGRATOR], p[layout.VELOCITY_GAIN], p[layout.VELOCITY_INTEGRAL],
         s[layout.S_TORQUE_FEEDFORWARD], limit, p[layout.VELOCITY_WINDUP], p[layout.VELOCITY_TRACKING],
     )  # fmt: skip
@@ -66,8 +46,8 @@ def torque_path(p, s, e, limit):
         s[layout.S_FLAGS_VELOCITY] = hit * stage
         return out
     s[layout.S_FLAGS_VELOCITY] = hit * float(layout.FLAG_TORQUE_COMMAND)
-    filtered = chain(p, layout.TORQUE_CHAIN, count, s, layout.S_TORQUE_CHAIN, out)
-    out = clamp(filtered, limit)
+    filtered = blocks.chain(p, layout.TORQUE_CHAIN, count, s, layout.S_TORQUE_CHAIN, out)
+    out = blocks.clamp(filtered, limit)
     if out != filtered:
         s[layout.S_FLAGS_VELOCITY] += stage
     return out
@@ -75,10 +55,10 @@ def torque_path(p, s, e, limit):
 
 def own_inner(p, s, io, th, command, measured, extra, limit):
     """A law of one's own of the velocity or the current: its output, before and behind the clamp."""
-    angle = counted(th, p[layout.OWN_COUNTS])
-    output = counted(io[layout.IN_OUTPUT], p[layout.OWN_OUTPUT_COUNTS])
-    v = own_output(p, s, io, command, command - measured, angle, output) + extra
-    return v, clamp(v, limit)
+    angle = blocks.counted(th, p[layout.OWN_COUNTS])
+    output = blocks.counted(io[layout.IN_OUTPUT], p[layout.OWN_OUTPUT_COUNTS])
+    v = blocks.own_output(p, s, io, command, command - measured, angle, output) + extra
+    return v, blocks.clamp(v, limit)
 
 
 def own_velocity(p, s, io, th, measured, limit):
@@ -88,9 +68,9 @@ def own_velocity(p, s, io, th, measured, limit):
     stage = float(layout.FLAG_CURRENT if p[layout.HAS_CURRENT] > 0.0 else layout.FLAG_VOLTAGE)
     s[layout.S_FLAGS_VELOCITY] = 0.0 if out == v else stage
     if p[layout.HAS_CURRENT] > 0.0:
-        out, flag = sloped(p, s, out, p[layout.VELOCITY_PERIOD])
+        out, flag = position.sloped(p, s, out, p[layout.VELOCITY_PERIOD])
         s[layout.S_FLAGS_VELOCITY] += flag
-    own_states(p, s, out - v)
+    blocks.own_states(p, s, out - v)
     return out
 
 
@@ -100,7 +80,7 @@ def velocity(p, s, io, w, th):
     if p[layout.OWN_MEASURES] > 0.0:
         measured = s[layout.S_MEASURED_SPEED]
     elif p[layout.RARE_SPEED] > 0.0:
-        measured = measured_speed(p, s, io, w, th)
+        measured = blocks.measured_speed(p, s, io, w, th)
     s[layout.S_MEASURED_SPEED] = measured
     e = s[layout.S_SPEED_REFERENCE] - measured
     cascaded = p[layout.HAS_CURRENT] > 0.0
@@ -110,34 +90,36 @@ def velocity(p, s, io, w, th):
     elif p[layout.RARE_VELOCITY] > 0.0:
         out = torque_path(p, s, e, limit)
         if cascaded:
-            out, flag = sloped(p, s, out, p[layout.VELOCITY_PERIOD])
+            out, flag = position.sloped(p, s, out, p[layout.VELOCITY_PERIOD])
             s[layout.S_FLAGS_VELOCITY] += flag
     else:
         step = p[layout.VELOCITY_INTEGRAL]
-        out, integral, hit = pi(e, s[layout.S_VELOCITY_INTEGRATOR], p[layout.VELOCITY_GAIN], step, limit)
+        out, integral, hit = blocks.pi(
+            e, s[layout.S_VELOCITY_INTEGRATOR], p[layout.VELOCITY_GAIN], step, limit
+        )
         s[layout.S_VELOCITY_INTEGRATOR] = integral
         s[layout.S_FLAGS_VELOCITY] = hit * float(layout.FLAG_CURRENT if cascaded else layout.FLAG_VOLTAGE)
     if cascaded:
-        put_current(p, s, io, out)
+        position.put_current(p, s, io, out)
     else:
-        put_voltage(p, s, io, out)
+        position.put_voltage(p, s, io, out)
 
 
 def current_rare(p, s, io, i, w, th):
     """Current controller with feed-forward, another anti-windup or an overload limit; its output."""
-    wanted = clamp(s[layout.S_CURRENT_REFERENCE], s[layout.S_CURRENT_LIMIT])
+    wanted = blocks.clamp(s[layout.S_CURRENT_REFERENCE], s[layout.S_CURRENT_LIMIT])
     fed = p[layout.BACK_EMF_FEEDFORWARD] != 0.0 and p[layout.OWN_MEASURES] <= 0.0
     if p[layout.HAS_VELOCITY] <= 0.0 and fed:
-        s[layout.S_MEASURED_SPEED] = measured_speed(p, s, io, w, th)
+        s[layout.S_MEASURED_SPEED] = blocks.measured_speed(p, s, io, w, th)
     extra = p[layout.BACK_EMF_FEEDFORWARD] * s[layout.S_MEASURED_SPEED]
     extra += p[layout.RESISTANCE_FEEDFORWARD] * wanted
     limit, integral = s[layout.S_VOLTAGE_LIMIT], s[layout.S_CURRENT_INTEGRATOR]
     if p[layout.OWN_STAGE] == layout.OWN_CURRENT:
         v, out = own_inner(p, s, io, th, wanted, i, extra, limit)
         hit = 0.0 if out == v else 1.0
-        own_states(p, s, out - v)
+        blocks.own_states(p, s, out - v)
     else:
-        out, integral, hit = regulator(
+        out, integral, hit = blocks.regulator(
             wanted - i, integral, p[layout.CURRENT_GAIN], p[layout.CURRENT_INTEGRAL],
             extra, limit, p[layout.CURRENT_WINDUP], p[layout.CURRENT_TRACKING],
         )  # fmt: skip
@@ -155,10 +137,10 @@ def current(p, s, io, i, w, th):
     else:
         e, step = s[layout.S_CURRENT_REFERENCE] - i, p[layout.CURRENT_INTEGRAL]
         before = s[layout.S_CURRENT_INTEGRATOR]
-        out, integral, hit = pi(e, before, p[layout.CURRENT_GAIN], step, s[layout.S_VOLTAGE_LIMIT])
+        out, integral, hit = blocks.pi(e, before, p[layout.CURRENT_GAIN], step, s[layout.S_VOLTAGE_LIMIT])
         s[layout.S_CURRENT_INTEGRATOR] = integral
         s[layout.S_FLAGS_CURRENT] = hit * float(layout.FLAG_VOLTAGE)
-    put_voltage(p, s, io, out)
+    position.put_voltage(p, s, io, out)
 
 
 def control(p, s, io, i, w, th):
@@ -167,7 +149,9 @@ def control(p, s, io, i, w, th):
         overload(p, s, i)
     due = p[layout.HAS_VELOCITY] <= 0.0 or s[layout.S_UNTIL_VELOCITY] <= 0.0
     if p[layout.OWN_MEASURES] > 0.0 and due:  # before the outermost stage, which takes it too
-        s[layout.S_MEASURED_SPEED] = measured_speed(p, s, io, w, th) if p[layout.RARE_SPEED] > 0.0 else w
+        s[layout.S_MEASURED_SPEED] = (
+            blocks.measured_speed(p, s, io, w, th) if p[layout.RARE_SPEED] > 0.0 else w
+        )
     if s[layout.S_UNTIL_OUTER] <= 0.0:
         s[layout.S_UNTIL_OUTER] = p[layout.OUTER_EVERY]
         outer(p, s, io, th)
@@ -182,7 +166,7 @@ def control(p, s, io, i, w, th):
 
 
 def control_tick(p, s, io):
-    """The controller alone, on what ``io[IN_CURRENT]`` and the next four inputs hold; returns the voltage."""
+    """The controller alone, on what is measured, from io[IN_CURRENT] on; returns the voltage."""
     if p[layout.SUPPLY] > 0.0:
         s[layout.S_VOLTAGE_LIMIT] = io[layout.IN_BUS]
     control(p, s, io, io[layout.IN_CURRENT], io[layout.IN_SPEED], io[layout.IN_ANGLE])

@@ -13,25 +13,9 @@ import math
 
 from actuator_lti.compiled.kernel import seldom
 from nonlinear._kernels import elastic_layout as at
+from nonlinear._kernels import elastic_modes as modes
+from nonlinear._kernels import elastic_series as series
 from nonlinear._kernels import layout
-from nonlinear._kernels.elastic_modes import (
-    change_mode,
-    contact_side,
-    elastic_slopes,
-    guard_offset,
-    guard_state,
-    map_place,
-    put_output,
-    spring_of,
-)
-from nonlinear._kernels.elastic_series import (
-    AT_ONCE,
-    NEVER,
-    fill_polynomial,
-    fill_series,
-    first_fall,
-    series_state,
-)
 from nonlinear._kernels.energy import NODES, WEIGHTS
 
 KERNELS = True
@@ -44,7 +28,7 @@ SURE = 1.001  # rounding does not decide what a bound allows
 def add_energies(p, s, h):
     """Add the energies over the first h of the interval whose series is filled."""
     for j in range(NODES.shape[0]):
-        i, w, W, d, _turned = series_state(p, s, h * NODES[j])
+        i, w, W, d, _turned = series.series_state(p, s, h * NODES[j])
         add_powers(p, s, h * WEIGHTS[j], i, w, W, d)
 
 
@@ -58,16 +42,16 @@ def add_powers(p, s, weight, i, w, W, d):
         s[e + layout.ENERGY_INPUT] += weight * u * i
         s[e + layout.ENERGY_COPPER] += weight * p[layout.RESISTANCE] * i * i
         s[e + layout.ENERGY_CONVERSION] += weight * (p[layout.BACK_EMF] - p[layout.TORQUE_CONSTANT]) * i * w
-    side = contact_side(s)
+    side = modes.contact_side(s)
     rate = w / p[layout.RATIO_TO_COUPLING] - W
     torque = 0.0
     if side != 0.0:
-        k, rest = spring_of(p, s, side)
+        k, rest = modes.spring_of(p, s, side)
         torque = k * (d - rest) + p[layout.COUPLING_DAMPING] * rate
         s[e + layout.ENERGY_DAMPING] += weight * p[layout.COUPLING_DAMPING] * rate * rate
     parted = 0.5 * s[at.ES_CONTACT]
     if abs(parted) == 1.0:
-        k, rest = spring_of(p, s, parted)
+        k, rest = modes.spring_of(p, s, parted)
         s[e + layout.ENERGY_PARTING] -= weight * k * (d - rest) * rate
     add_motor_friction(p, s, weight, w, torque)
     s[e + layout.ENERGY_LOAD_DRY] += weight * p[layout.LOAD_DRY] * s[at.ES_LOAD] * W
@@ -80,7 +64,7 @@ def add_powers(p, s, weight, i, w, W, d):
 
 def add_motor_friction(p, s, weight, w, torque):
     """Motor friction; a self-locking stage keeps what it does not hand on to the coupling."""
-    e, direction, place = layout.S_ENERGY, s[layout.S_DIRECTION], map_place(p, s)
+    e, direction, place = layout.S_ENERGY, s[layout.S_DIRECTION], modes.map_place(p, s)
     level, slope = p[place + at.MAP_LEVEL], p[place + at.MAP_SLOPE]
     dry = (
         direction * (level + p[at.EL_LOAD_COEFFICIENT] * abs(torque))
@@ -96,11 +80,8 @@ def add_motor_friction(p, s, weight, w, torque):
 
 
 def elastic_motion(p, s, part, held, M, extra):
-    """Advance the plant by one held segment; returns a status of ``layout``.
-
-    ``part`` 0 is the first f of the tick, 1 the rest; ``held`` the voltage (or a source's input), ``M`` the
-    moment at the output shaft, ``extra`` a torque at the motor shaft.  At most ``MAX_EVENTS`` events.
-    """
+    """Advance the plant by one held segment, 0: the first f of the tick, 1: the rest; returns a status."""
+    # held: voltage, or a source's input; M: moment at the output shaft; extra: torque at the motor shaft
     whole = p[layout.LENGTH + part]
     s[at.ES_HAPPENED] = 0.0
     if whole <= 0.0:
@@ -124,7 +105,7 @@ def put_torques(p, s):
 
 def pace(p, s):
     """Square of the norm of x' in the units of energy, which bounds every derivative of a guard."""
-    di, dw, dW, dd = elastic_slopes(p, s)
+    di, dw, dW, dd = modes.elastic_slopes(p, s)
     weight = int(s[at.ES_MODE]) + at.MODE_WEIGHT
     di, dw, dW, dd = di * p[weight], dw * p[weight + 1], dW * p[weight + 2], dd * p[weight + 3]
     return di * di + dw * dw + dW * dW + dd * dd
@@ -135,8 +116,8 @@ def guards_hold(p, s, chord, i, w, W, d):
     room = LARGEST
     for j in range(int(s[at.ES_GUARDS])):
         g = at.ES_GUARD + j * at.GUARD_SIZE
-        offset = guard_offset(s, g)
-        before = guard_state(s, g) + offset
+        offset = modes.guard_offset(s, g)
+        before = modes.guard_state(s, g) + offset
         after = s[g + at.G_I] * i + s[g + at.G_W] * w + (s[g + at.G_V] * W + s[g + at.G_D] * d) + offset
         if not (min(before, after) > s[g + at.G_CURVE] * chord):
             return False
@@ -153,10 +134,8 @@ def row_of(p, o, i, w, W, d, u, a, b):
 
 
 def stride(p, s, number, h):
-    """Take one precomputed step if no guard can cross in it: 0, 1 the segments, 2 + j the step Ts/2^j.
-
-    ``h`` is its length.  The guards are looked at only where the state may have come near one since.
-    """
+    """Take a precomputed step of length h if no guard can cross in it: 0, 1 the segments, 2 + j Ts/2^j."""
+    # guards are looked at only where the state may have come near one since
     m = int(s[at.ES_MODE])
     o = m + at.MODE_REACH + 3 + int(p[at.EL_LEVELS]) + number * at.STEP_SIZE
     i, w, W, d = s[layout.S_CURRENT], s[layout.S_SPEED], s[at.ES_LOAD_SPEED], s[at.ES_TWIST]
@@ -184,7 +163,7 @@ def put_state(p, s, i, w, W, d, turned):
     s[layout.S_ANGLE] += turned
     if s[at.ES_LOAD] != 0.0:
         s[at.ES_LOAD_ANGLE] = s[layout.S_ANGLE] / p[layout.RATIO_TO_COUPLING] - d
-    put_output(p, s)
+    modes.put_output(p, s)
 
 
 @seldom
@@ -213,16 +192,16 @@ def walk(p, s, whole):
                 continue
         h = min(left, shortest)
         s[at.ES_ROOM] = 0.0  # what is walked is not counted
-        fill_series(p, s)
+        series.fill_series(p, s)
         t, event = first_event(p, s, h)
         if energy:
             add_energies(p, s, t)
         if t > 0.0:
-            i, w, W, d, turned = series_state(p, s, t)
+            i, w, W, d, turned = series.series_state(p, s, t)
             put_state(p, s, i, w, W, d, turned)
             left -= t
         if event != at.NO_EVENT:
-            change_mode(p, s, event)
+            modes.change_mode(p, s, event)
             put_torques(p, s)
             events += 1
             s[at.ES_HAPPENED] += 1.0
@@ -234,26 +213,26 @@ def first_event(p, s, h):
     """Time and number of the first event of the interval whose series is filled; h and 0 if none."""
     best, event = h, at.NO_EVENT
     m, n = int(s[at.ES_MODE]), int(p[at.EL_TERMS])
-    i, w, W, d, _turned = series_state(p, s, h)
+    i, w, W, d, _turned = series.series_state(p, s, h)
     chord = 0.125 * h * h * p[m + at.MODE_GROWTH] * math.sqrt(pace(p, s))
     if not (chord < LARGEST):
         return best, event
     for j in range(int(s[at.ES_GUARDS])):
         g = at.ES_GUARD + j * at.GUARD_SIZE
-        offset = guard_offset(s, g)
-        before = guard_state(s, g) + offset
+        offset = modes.guard_offset(s, g)
+        before = modes.guard_state(s, g) + offset
         after = s[g + at.G_I] * i + s[g + at.G_W] * w + (s[g + at.G_V] * W + s[g + at.G_D] * d) + offset
         if min(before, after) > s[g + at.G_CURVE] * chord:
             continue
-        tolerance = fill_polynomial(p, s, g, offset, h)
+        tolerance = series.fill_polynomial(p, s, g, offset, h)
         number = int(s[g + at.G_EVENT])
-        t = AT_ONCE
+        t = series.AT_ONCE
         breaks_away = at.MOTOR_UP <= number <= at.MOTOR_DOWN or at.LOAD_UP <= number <= at.LOAD_DOWN
         # a step of the inputs can break a rest at once, even if it would hold again later
         if not (breaks_away and before < -tolerance):
-            t = first_fall(s, n, best, tolerance)
-        if t == AT_ONCE:
+            t = series.first_fall(s, n, best, tolerance)
+        if t == series.AT_ONCE:
             t = 0.0
-        if t != NEVER and (t < best or event == at.NO_EVENT):
+        if t != series.NEVER and (t < best or event == at.NO_EVENT):
             best, event = t, number
     return best, event

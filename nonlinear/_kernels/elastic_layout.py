@@ -1,8 +1,7 @@
 """Where each number of the event-driven plant lives: its block of parameters and its part of the state.
 
-What is derived for it lies from ``layout.ELASTIC`` in the row p (its length depends on the design, so it is
-the last part of the row), its state from ``layout.ELASTIC_STATE`` in the row s.  Symbols are those of
-model.md section 6; SI.
+What is derived for it is the last part of the row p, as its length depends on the design; symbols are those
+of model.md section 6.
 """
 
 from nonlinear._kernels import layout

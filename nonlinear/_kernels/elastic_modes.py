@@ -210,10 +210,8 @@ def put_curvature(p, s, mode, g):
 
 
 def put_room(p, s, mode, g):
-    """How far the state may go for each unit of the guard's value; 0 where inputs move the guard at once.
-
-    Over no more than that the chord bound of a whole period holds too: |g| and Ts/8 |g''| for |x'| = 1.
-    """
+    """How far the state may go for each unit of the guard's value; 0 where inputs move it at once."""
+    # so far the chord bound of a whole period holds too: |g| and Ts/8 |g''| for |x'| = 1
     total, moved = 0.0, 0.0
     for j in range(4):
         weight = p[mode + at.MODE_WEIGHT + j]
@@ -319,10 +317,7 @@ def change_contact(p, s, event):
 
 
 def land(p, s, speed, slip, up):
-    """A side's speed has come to zero: rest if its torque is within its level, else reversal.
-
-    Its speed and direction of slip stand at ``speed`` and ``slip``; ``up`` and the next are its breakaways.
-    """
+    """A side's speed has come to zero: rest if its breakaways, ``up`` and the next, hold, else reversal."""
     direction = s[slip]
     s[speed], s[slip] = 0.0, 0.0
     enter_mode(p, s)

@@ -2,8 +2,7 @@
 
 A mode is (motor at rest or slipping on a segment of its friction map) x (gap, contact on either side) x
 (load at rest or slipping).  Each holds its matrix, a norm that its energy cannot outgrow, and exact
-transitions over both held segments and over Ts/2^j.  The row is as long as the modes need:
-`prepare_elastic_sizes` says how long, `prepare_elastic` fills it.
+transitions over both held segments and over Ts/2^j.
 """
 
 import math
@@ -20,10 +19,7 @@ LARGEST_POWER = 700.0  # of e in double precision
 
 
 def prepare_elastic_sizes(p):
-    """Shares of torque, friction segments, how often the period is halved, and the length of the row.
-
-    ``p`` reaches at least to ``elastic_layout.EL_LEAST``.
-    """
+    """Shares, friction segments, halvings of the period, and the length of p, which reaches to `EL_LEAST`."""
     put_shares(p)
     norm, modes = 0.0, mode_count(p)
     for number in range(modes):  # one after the other in the place of the first
@@ -90,10 +86,7 @@ def put_springs(p):
 
 
 def put_segments(p, side):
-    """The motor's friction for w > 0 (side 0) or w < 0 as lines T = level + slope |w|: begins, level, slope.
-
-    Without a map one line, C0 and Cv; the last slope of a map continues.
-    """
+    """The motor's friction for w > 0 (side 0) or w < 0 as lines T = level + slope |w|; the last continues."""
     count, point = int(p[layout.MAP_COUNT + side]), layout.MAP + side * 2 * layout.MAX_POINTS
     place = at.EL_MAP + side * at.MAP_SIDE
     p[at.EL_SEGMENTS + side] = float(max(count - 1, 1))
@@ -110,9 +103,7 @@ def put_segments(p, side):
 
 
 def mode_count(p):
-    """Number of modes: motor at rest or on a segment of either side, gap or contact on either side with a
-    piece of the spring, load at rest or not.
-    """
+    """Number of modes: motor at rest or on a segment, gap or contact on either side, load at rest or not."""
     motors = 1 + int(p[at.EL_SEGMENTS]) + int(p[at.EL_SEGMENTS_REVERSE])
     return (2 + 4 * int(p[at.EL_SPRINGS])) * motors
 
@@ -177,10 +168,8 @@ def put_load_side(p, m, motor_slips, load_slips, share, k, c):
 
 
 def put_weights(p, m, k):
-    """Square roots of L, J_m, J_l, k: in these units a passive plant does not grow.
-
-    A state that acts on no other (the twist in the gap, the absent current) weighs nothing.
-    """
+    """Square roots of L, J_m, J_l, k: in these units a passive plant does not grow."""
+    # a state that acts on no other (the twist in the gap, the absent current) weighs nothing
     weight = m + at.MODE_WEIGHT
     p[weight] = 0.0 if p[layout.SOURCE] > 0.0 else math.sqrt(p[layout.INDUCTANCE])
     p[weight + 1] = math.sqrt(p[layout.MOTOR_INERTIA])

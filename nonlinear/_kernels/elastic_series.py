@@ -118,12 +118,9 @@ def shift(s, n, x):
 
 
 def first_fall(s, n, h, tolerance):
-    """First time in [0, h] at which the polynomial comes down to zero; it is used up.
-
-    A start at or below zero counts only if it does not become positive first: `AT_ONCE` if it goes further
-    down than its rounding, `NEVER` if it stays there.  The origin moves along, so that the bound of the
-    second derivative is a local one: beside a multiple zero the steps grow with the distance from it.
-    """
+    """First time in [0, h] at which the polynomial comes down to zero; it is used up."""
+    # a start at or below zero, if it does not become positive first: `AT_ONCE` if it goes further down than
+    # its rounding, `NEVER` if it stays there; the origin moves along, so that the bound is a local one
     a, step = 0.0, h
     armed = s[at.ES_POLYNOMIAL] > 0.0
     while a < h:

@@ -1,7 +1,7 @@
-"""Where the electrical energy goes: integrals over slip and stick.
+"""Where the electrical energy goes: integrals over slip, and closed forms over stick.
 
-Over slip: Gauss-Legendre of ten points on the closed-form state, in pieces short against every eigenvalue,
-which is exact to rounding.  Over stick: closed forms.
+Gauss-Legendre of ten points on the closed-form state, in pieces short against every eigenvalue, is exact to
+rounding.
 """
 
 import math

@@ -26,10 +26,7 @@ _PLANTS = {
 
 
 def forms() -> tuple[Form, ...]:
-    """For each kind of plant; those of plain loops with a delay of less than one tick and of one to two.
-
-    The last that fits is taken.
-    """
+    """Of each kind of plant, and plain loops with a delay of up to two ticks; the last that fits is taken."""
     unseen = dict.fromkeys(_UNSEEN, 0.0)
     plain = dict.fromkeys(_ABSENT, 0.0) | dict.fromkeys(_PRESENT, 1.0)
     common = dict.fromkeys((*_UNSEEN, *_ORDINARY), 0.0) | dict.fromkeys(_MEASURED, 1.0) | _PLANTS["elastic"]

@@ -2,19 +2,7 @@
 
 import math
 
-from nonlinear._kernels import layout
-from nonlinear._kernels.blocks import (
-    PROBE_I,
-    PROBE_U,
-    PROBE_W,
-    PROBE_Y,
-    chain,
-    clamp,
-    counted,
-    own_output,
-    own_states,
-    probe,
-)
+from nonlinear._kernels import blocks, layout
 
 KERNELS = True
 
@@ -23,13 +11,11 @@ STANDING = 1e-13  # change of the reference, relative, below which it stands sti
 
 
 def profile(p, s, wanted):
-    """Follow the command with limited first and second derivative; exact where it keeps both limits itself.
-
-    The profile aims at the command's own speed, plus what closes the gap in the fewest samples without
-    overshoot (the discrete-time optimal braking curve; Zanasi, Lo Bianco, Tonielli 2000).
-    """
+    """Follow the command with limited first and second derivative; exact where it keeps both itself."""
+    # it aims at the command's own speed, plus what closes the gap in the fewest samples without overshoot
+    # (the discrete-time optimal braking curve; Zanasi, Lo Bianco, Tonielli 2000)
     T, rate, a = p[layout.POSITION_PERIOD], p[layout.PROFILE_RATE], p[layout.PROFILE_ACCELERATION]
-    r = clamp(wanted, p[layout.PROFILE_RANGE])
+    r = blocks.clamp(wanted, p[layout.PROFILE_RANGE])
     x, v, last = s[layout.S_PROFILE], s[layout.S_PROFILE_SPEED], s[layout.S_PROFILE_COMMAND]
     gap = last - x
     closing = gap / T  # covers the gap in whole samples while the speed falls by a T in each
@@ -39,7 +25,7 @@ def profile(p, s, wanted):
         speed = d / ((steps + 1.0) * T) + 0.5 * steps * a * T
         closing = speed if gap > 0.0 else -speed
     aim = (r - last) / T + closing
-    allowed = clamp(aim, rate)
+    allowed = blocks.clamp(aim, rate)
     if abs(allowed - v) > a * T:
         allowed = v + a * T if allowed > v else v - a * T
     x = r if allowed == aim and abs(gap) < a * T * T else x + T * allowed
@@ -74,13 +60,13 @@ def shape(p, s, wanted):
             s[layout.S_FLAGS_PROFILE] = float(layout.FLAG_PROFILE)
     if p[layout.PROFILE_SAMPLES] > 1.0:
         r = average(p, s, r)
-    return chain(p, layout.COMMAND_CHAIN, int(p[layout.COMMAND_FILTERS]), s, layout.S_COMMAND_CHAIN, r)
+    return blocks.chain(p, layout.COMMAND_CHAIN, int(p[layout.COMMAND_FILTERS]), s, layout.S_COMMAND_CHAIN, r)
 
 
 def sloped(p, s, v, T):
     """What the slope limit leaves of a current command that is updated every T, and its flag."""
     change = v - s[layout.S_CURRENT_BEFORE]
-    allowed = clamp(change, p[CURRENT_RATE] * T)
+    allowed = blocks.clamp(change, p[CURRENT_RATE] * T)
     if allowed == change:
         return v, 0.0
     return s[layout.S_CURRENT_BEFORE] + allowed, FLAG_CURRENT_RATE
@@ -89,35 +75,35 @@ def sloped(p, s, v, T):
 def limited(p, s, v):
     """What the limits of the next stage leave of v, and their flags; nothing is stored."""
     if p[layout.HAS_VELOCITY] > 0.0:
-        target = clamp(v, p[layout.SPEED_LIMIT])
+        target = blocks.clamp(v, p[layout.SPEED_LIMIT])
         change = target - s[layout.S_SPEED_COMMAND]
-        allowed = clamp(change, p[layout.SPEED_STEP])
+        allowed = blocks.clamp(change, p[layout.SPEED_STEP])
         flags = 0.0 if target == v else float(layout.FLAG_SPEED)
         if allowed == change:
             return target, flags
         return s[layout.S_SPEED_COMMAND] + allowed, flags + float(layout.FLAG_ACCELERATION)
     if p[layout.HAS_CURRENT] > 0.0:
-        target = clamp(v, s[layout.S_CURRENT_LIMIT])
+        target = blocks.clamp(v, s[layout.S_CURRENT_LIMIT])
         out, flags = sloped(p, s, target, p[layout.POSITION_PERIOD])
         return out, flags if target == v else flags + float(layout.FLAG_CURRENT)
-    out = clamp(v, s[layout.S_VOLTAGE_LIMIT])
+    out = blocks.clamp(v, s[layout.S_VOLTAGE_LIMIT])
     return out, 0.0 if out == v else float(layout.FLAG_VOLTAGE)
 
 
 def put_voltage(p, s, io, v):
     """Make v the voltage of this tick, through its probe."""
     s[layout.S_VOLTAGE_BEFORE] = s[layout.S_VOLTAGE] = v
-    if p[PROBE_U] > 0.0:
-        after = probe(p, s, io, layout.POINT_VOLTAGE, v)
-        s[layout.S_VOLTAGE] = clamp(after, s[layout.S_VOLTAGE_LIMIT])
+    if p[blocks.PROBE_U] > 0.0:
+        after = blocks.probe(p, s, io, layout.POINT_VOLTAGE, v)
+        s[layout.S_VOLTAGE] = blocks.clamp(after, s[layout.S_VOLTAGE_LIMIT])
 
 
 def put_current(p, s, io, v):
     """Make v the current command, through its probe."""
     s[layout.S_CURRENT_BEFORE] = s[layout.S_CURRENT_REFERENCE] = v
-    if p[PROBE_I] > 0.0:
-        after = probe(p, s, io, layout.POINT_CURRENT, v)
-        s[layout.S_CURRENT_REFERENCE] = clamp(after, s[layout.S_CURRENT_LIMIT])
+    if p[blocks.PROBE_I] > 0.0:
+        after = blocks.probe(p, s, io, layout.POINT_CURRENT, v)
+        s[layout.S_CURRENT_REFERENCE] = blocks.clamp(after, s[layout.S_CURRENT_LIMIT])
 
 
 def put_outer(p, s, io, out, flags):
@@ -125,9 +111,9 @@ def put_outer(p, s, io, out, flags):
     s[layout.S_FLAGS_OUTER] = flags
     if p[layout.HAS_VELOCITY] > 0.0:
         s[layout.S_SPEED_COMMAND] = s[layout.S_SPEED_REFERENCE] = out
-        if p[PROBE_W] > 0.0:
-            after = probe(p, s, io, layout.POINT_SPEED, out)
-            s[layout.S_SPEED_REFERENCE] = clamp(after, p[layout.SPEED_LIMIT])
+        if p[blocks.PROBE_W] > 0.0:
+            after = blocks.probe(p, s, io, layout.POINT_SPEED, out)
+            s[layout.S_SPEED_REFERENCE] = blocks.clamp(after, p[layout.SPEED_LIMIT])
     elif p[layout.HAS_CURRENT] > 0.0:
         put_current(p, s, io, out)
     else:
@@ -137,7 +123,7 @@ def put_outer(p, s, io, out, flags):
 def probed_output(p, s, io, y):
     """The output angle behind its probe."""
     s[layout.S_OUTPUT_BEFORE] = y
-    s[layout.S_OUTPUT_AFTER] = probe(p, s, io, layout.POINT_OUTPUT, y)
+    s[layout.S_OUTPUT_AFTER] = blocks.probe(p, s, io, layout.POINT_OUTPUT, y)
     return s[layout.S_OUTPUT_AFTER]
 
 
@@ -145,10 +131,10 @@ def position_feedback(p, s, io, th):
     """The angle that the position loop sees, as an angle of the motor."""
     N = p[layout.RATIO]
     if p[layout.OUTPUT_SENSOR] > 0.0:
-        y = counted(io[layout.IN_OUTPUT], p[layout.POSITION_COUNTS])
-        return N * probed_output(p, s, io, y) if p[PROBE_Y] > 0.0 else N * y
-    angle = counted(th, p[layout.POSITION_COUNTS])
-    return N * probed_output(p, s, io, angle / N) if p[PROBE_Y] > 0.0 else angle
+        y = blocks.counted(io[layout.IN_OUTPUT], p[layout.POSITION_COUNTS])
+        return N * probed_output(p, s, io, y) if p[blocks.PROBE_Y] > 0.0 else N * y
+    angle = blocks.counted(th, p[layout.POSITION_COUNTS])
+    return N * probed_output(p, s, io, angle / N) if p[blocks.PROBE_Y] > 0.0 else angle
 
 
 def feedforward(p, s, reference):
@@ -190,16 +176,16 @@ def position_law(p, s, io, reference, th):
 
 def own_position(p, s, io, reference, th):
     """A law of one's own of the position; its own angle is the one that the probe has passed."""
-    angle = counted(th, p[layout.OWN_COUNTS])
-    output = counted(io[layout.IN_OUTPUT], p[layout.OWN_OUTPUT_COUNTS])
+    angle = blocks.counted(th, p[layout.OWN_COUNTS])
+    output = blocks.counted(io[layout.IN_OUTPUT], p[layout.OWN_OUTPUT_COUNTS])
     y = position_feedback(p, s, io, th)
     if p[layout.OUTPUT_SENSOR] > 0.0:
         output = y / p[layout.RATIO]
     else:
         angle = y
-    v = own_output(p, s, io, reference, reference - y, angle, output)
+    v = blocks.own_output(p, s, io, reference, reference - y, angle, output)
     out, flags = limited(p, s, v)
-    own_states(p, s, out - v)
+    blocks.own_states(p, s, out - v)
     return out, flags
 
 

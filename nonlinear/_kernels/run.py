@@ -161,12 +161,9 @@ def run_block(p, s, io, block, first, count, history, flag_history, out):
 
 
 def run(p, s, io, block, tables, history, flag_history, out, shared):
-    """Run the drive described by ``p`` from the state ``s``; returns a status number of ``layout``.
-
-    ``history`` is flat, columns one after the other, or empty; ``flag_history`` one number a row; ``out`` a
-    row of results; ``shared[0]`` is set to the ticks done from time to time, a non-zero ``shared[1]`` stops
-    the run.
-    """
+    """Run the drive described by ``p`` from the state ``s``; returns a status number of ``layout``."""
+    # history: columns one after the other, or empty; flag_history: a number a row; out: a row of results;
+    # shared[0]: ticks done, told from time to time; a non-zero shared[1] stops the run
     clear(p, out)
     s[elastic_layout.ES_ROOM] = 0.0  # the state may have been changed
     ticks, k = int(p[layout.TICKS]), int(s[layout.S_TICK])

@@ -15,11 +15,8 @@ ITERATIONS = 200
 
 
 def first_landing(p, s, at, reverse, d, i, w, th, u, T, dt):
-    """First time in (0, dt] at which s w falls to zero.
-
-    ``NONE_IN_SEGMENT`` if it stays positive; ``NEVER_LEFT`` if a speed that begins at zero has not become
-    positive by dt (a departure lost in rounding).  A start at zero is not a landing.
-    """
+    """First time in (0, dt] at which d w falls to zero, which a start at zero is not."""
+    # `NEVER_LEFT`: a speed that begins at zero has not become positive by dt (a departure lost in rounding)
     up = d * w > 0.0
     begin = 0.0
     gap = 0.5 * math.pi / p[at + layout.ROOT] if int(p[at + layout.KIND]) == COMPLEX else 0.0
@@ -80,10 +77,7 @@ def breakaway_time(p, i, level, u, Tb, dt):
 
 
 def stick(p, i, u, Tb, Tp, Tm, dt, decay):
-    """Locked rotor: time spent, current after it, direction of the breakaway (0: none).
-
-    ``decay`` is exp(-R dt/L).
-    """
+    """Locked rotor: time spent, current after it, direction of breakaway (0: none); decay: exp(-R dt/L)."""
     kM, Kg = p[layout.TORQUE_CONSTANT], p[layout.SOURCE_GAIN]
     drive = kM * i + Kg * u + Tb
     if drive > Tp:
@@ -113,10 +107,7 @@ def direction_at_rest(p, i, u, Tb, Tp, Tm, d):
 
 
 def slip_part(p, s, part, left, u, Tb, Tc, i, w, th, d):
-    """Slip in direction d until it lands or the segment ends: time spent, (i, w, th), and how it ended.
-
-    The end is `NONE_IN_SEGMENT`, `NEVER_LEFT`, or 0 for a landing.
-    """
+    """Slip in direction d up to a landing or the end: time spent, (i, w, th), how it ended (0: landed)."""
     side = 1 if d < 0.0 else 0
     at = layout.MODES + side * layout.MODAL
     T = Tb - d * Tc
@@ -139,10 +130,7 @@ def slip_part(p, s, part, left, u, Tb, Tc, i, w, th, d):
 
 @seldom
 def segment(p, s, part, u, events):
-    """Advance current, speed, angle and direction of the state row over one segment with all its events.
-
-    ``events`` counts those of this tick so far; returns their new number, or -1 where there are too many.
-    """
+    """Advance the state row over one segment; returns the events of the tick so far, -1: too many."""
     Tb, Tcp, Tcm = s[layout.S_TORQUE], s[layout.S_DRY], s[layout.S_DRY_REVERSE]
     Tp, Tm = Tcp * p[layout.BREAKAWAY], Tcm * p[layout.BREAKAWAY]
     i, w, th, d = s[layout.S_CURRENT], s[layout.S_SPEED], s[layout.S_ANGLE], s[layout.S_DIRECTION]

@@ -25,10 +25,8 @@ TO = np.array([layout.BLOCK_LOAD, layout.BLOCK_TORQUE, layout.BLOCK_SUPPLY])  # 
 
 
 def sine(x):
-    """sin x for \\|x\\| < `LARGEST`: the series of sin about the nearest multiple of pi, to 1e-18.
-
-    A library's differs in the last digit between machines, and is asked for one number at a time.
-    """
+    """sin x for abs(x) < `LARGEST`: its series about the nearest multiple of pi, to 1e-18."""
+    # a library's differs in the last digit between machines, and is asked for one number at a time
     n = (x * PER_PI + ROUNDER) - ROUNDER
     odd = n - 2.0 * ((0.5 * n + ROUNDER) - ROUNDER)  # -1, 0 or 1
     r = ((x - n * PI_1) - n * PI_2) - n * PI_3
@@ -56,11 +54,9 @@ def chirp_cycles(kind, f0, f1, span, s):
 
 
 def signal(row, at, tables, k, period):
-    """Value at tick k of the signal whose eight numbers begin at ``row[at]``.
-
-    Numbers: kind, amplitude, start time, then frequency and phase (sine, triangle), stop time (ramp),
-    f0, f1 and span (chirps), offset and length in ``tables`` (table: held after its end).
-    """
+    """Value at tick k of the signal whose eight numbers begin at ``row[at]``."""
+    # kind, amplitude, start time; then frequency and phase (sine, triangle), stop time (ramp), f0, f1 and
+    # span (chirps), offset and length in the tables (table: held after its end)
     kind = int(row[at])
     if kind == layout.NONE:
         return 0.0

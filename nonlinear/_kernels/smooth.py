@@ -38,10 +38,8 @@ FORM_II, FORM_IW, FORM_WW, FORM_NW = 7, 35, 63, 91  # after the seven of i
 
 
 def phi_columns(p, t, h, work, at):
-    """exp of the plant over t, at ``at + MATRIX``; a chain of integrators over h feeds the torque.
-
-    Column 4 is the response to a unit torque, 5 to the torque t/h, 6 to (t/h)^2/2.
-    """
+    """exp of the plant over t, at ``at + MATRIX``; a chain of integrators over h feeds the torque."""
+    # column 4 is the response to a unit torque, 5 to the torque t/h, 6 to (t/h)^2/2
     plant(p, layout.FORWARD, t, work, at, layout.TANH_ORDER)
     work[at + 4 * 7 + 5] = t / h
     work[at + 5 * 7 + 6] = t / h
@@ -168,10 +166,7 @@ def energy_step(p, s, form, angle, i, w, u, Tb, n0, nm, nc):
 
 
 def torque_at(p, w, T, Tcp, Tcm):
-    """Torque of the friction beyond the forward viscous slope, with its sign in the equation of motion.
-
-    ``T`` is the tanh at that speed.
-    """
+    """Torque of friction beyond the forward viscous slope, signed as in the equation; ``T`` is the tanh."""
     if w >= 0.0:
         return -Tcp * T
     return -Tcm * T - (p[layout.VISCOUS_REVERSE] - p[layout.VISCOUS]) * w

@@ -2,7 +2,7 @@
 
 import math
 
-from nonlinear._kernels import layout
+from nonlinear._kernels import layout, tick
 from nonlinear._kernels.elastic_modes import find_mode
 from nonlinear._kernels.elastic_prepare import prepare_elastic, prepare_elastic_sizes
 from nonlinear._kernels.energy import prepare_forms
@@ -10,24 +10,12 @@ from nonlinear._kernels.motion import closely, count_events, hold, put_load, qui
 from nonlinear._kernels.sense import seed_streams
 from nonlinear._kernels.slipping import COMPLEX, describe, transition
 from nonlinear._kernels.smooth import prepare_tanh
-from nonlinear._kernels.tick import (
-    decide,
-    init_command,
-    init_controller,
-    init_elastic,
-    init_estimate,
-    init_lines,
-    put_direction,
-)
 
 KERNELS = True
 
 
 def prepare_run_sizes(p):
-    """Places of the parts of the state whose lengths differ from drive to drive, and both rows' lengths.
-
-    Of an elastic drive `prepare_elastic_sizes` comes next: its row of parameters is longer.
-    """
+    """Places of the parts of the state whose lengths differ from drive to drive; both rows' lengths."""
     p[layout.PARAMETER_SIZE] = float(layout.P_SIZE)
     if p[layout.LAW] > 0.0:
         p[layout.PARAMETER_SIZE] += float(layout.TANH_SIZE)
@@ -138,14 +126,14 @@ def prepare_plant(p, work):
 
 
 def prepare_sizes(p):
-    """Work out the lengths of both rows; of an elastic drive train also its friction segments."""
+    """Work out the lengths of both rows, first of all and after every change of p."""
     prepare_run_sizes(p)
     if p[layout.ELASTIC_DRIVE] > 0.0:
         prepare_elastic_sizes(p)
 
 
 def derive(p, s):
-    """Fill all derived parameters, after `prepare_sizes`; ``s`` lends its work space."""
+    """Fill all derived parameters, after `prepare_sizes`; s lends its work space."""
     prepare_periods(p)
     prepare_gates(p)
     prepare_plant(p, s)
@@ -159,37 +147,34 @@ def derive(p, s):
 
 
 def init(p, s):
-    """Write the state at t_0 into ``s``, ``p[STATE_SIZE]`` numbers."""
+    """Write the state at t_0, before the first tick, into s, p[STATE_SIZE] numbers."""
     for j in range(int(p[layout.STATE_SIZE])):
         s[j] = 0.0
     s[layout.S_CURRENT], s[layout.S_SPEED] = p[layout.CURRENT_START], p[layout.SPEED_START]
     s[layout.S_ANGLE] = p[layout.ANGLE_START]
-    put_direction(p, s)
+    tick.put_direction(p, s)
     put_load(p, s, p[layout.LOAD], 0.0)
-    init_controller(p, s)
-    init_estimate(p, s)
-    init_command(p, s)
-    init_lines(p, s)
+    tick.init_controller(p, s)
+    tick.init_estimate(p, s)
+    tick.init_command(p, s)
+    tick.init_lines(p, s)
     seed_streams(s, p[layout.SEED])
     if p[layout.ELASTIC_DRIVE] > 0.0:
-        init_elastic(p, s)
+        tick.init_elastic(p, s)
 
 
 def retune(p, s):
     """Fit the state to parameters that were changed between two ticks, after `derive`."""
     put_load(p, s, s[layout.S_LOAD], 0.0)
-    put_direction(p, s)
+    tick.put_direction(p, s)
     if p[layout.ELASTIC_DRIVE] > 0.0:
         find_mode(p, s)
 
 
 def part_of_tick(p, q, s, io, tau):
-    """Sense and control at t_k and move to t_k + tau, 0 < tau < Ts; returns a status.
-
-    ``s`` is a copy of the state at t_k that no tick goes on from.  ``q``, a copy of derived ``p``, becomes
-    the plant over a tick of tau seconds, exact as over a whole one: the voltage changes at t_k + f in both.
-    """
-    decide(p, s, io)
+    """Sense, control, move to t_k + tau, 0 < tau < Ts, on a copy of the state; q, a copy of p, is used up."""
+    # q becomes the plant over a tick of tau, exact as over a whole one: in both the voltage changes at f
+    tick.decide(p, s, io)
     hold(p, s, io)
     q[layout.PERIOD], q[layout.DELAY_FRACTION] = tau, min(p[layout.DELAY_FRACTION], tau)
     derive(q, s)

@@ -25,10 +25,7 @@ def _declared() -> dict[int, tuple[str, str]]:
 
 
 def state_kinds(p: npt.NDArray[np.float64]) -> npt.NDArray[np.str_]:
-    """Kind of each number of the state, one of `KINDS`, by a row of parameters with their sizes written.
-
-    What each kind is stands beside its name in the layout.
-    """
+    """Kind of each number of the state, one of `KINDS`, by a row of parameters with its sizes written."""
     kinds = {place: kind for place, (kind, _) in _declared().items()} | {int(p[layout.AT_WORK]): WORK}
     places = sorted(kinds)
     lengths = np.diff([*places, int(p[layout.STATE_SIZE])])

@@ -1,8 +1,4 @@
-"""The drive as a machine with a state: `start.init` once, `step` every tick.
-
-`get` and `set_state` copy the state.  All rows are flat.
-A state copied out and set again elsewhere goes on with the same bits.
-"""
+"""The drive as a machine with a state, which goes on elsewhere with the same bits: `step` every tick."""
 
 from nonlinear._kernels import elastic_layout, layout
 from nonlinear._kernels.blocks import TRACKING, clamp, counted, fill_ring, settle
@@ -143,14 +139,14 @@ def step(p, s, io):
 
 
 def tick(p, s, io):
-    """`step` to be called from outside; returns the status."""
+    """One tick, inputs held: sense, control, move by one period; returns a status."""
     s[elastic_layout.ES_ROOM] = 0.0  # the state may have been changed
     step(p, s, io)
     return int(s[layout.S_STATUS])
 
 
 def get(p, s, to):
-    """Copy the state out."""
+    """Copy the state out, p[STATE_SIZE] numbers."""
     for j in range(int(p[layout.STATE_SIZE])):
         to[j] = s[j]
 

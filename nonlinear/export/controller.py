@@ -13,10 +13,10 @@ from actuator_lti.design.writing import design_hash
 from actuator_lti.start.extras import package_version
 from nonlinear._kernels import layout as at
 from nonlinear.export.c_files import plain, refuse_prefix
-from nonlinear.export.controller_cut import Controller, begins, controller_of
+from nonlinear.export.controller_cut import ENTRIES, Controller, begins, controller_of
 from nonlinear.export.controller_names import SIGNAL_AT, member_words
 from nonlinear.export.controller_vectors import roundings, vectors_text
-from nonlinear.export.program import FLAGS, c_text, filled, single
+from nonlinear.export.program import FLAGS, c_text, declared, filled, single
 
 _LIBRARY = re.compile(r"\b(sqrt|floor|fabs|exp|log|sin|cos|tan)\(")
 
@@ -46,7 +46,7 @@ def controller_export(
         "PRECISION": "single" if single_precision else "double",
         "CONSTANTS": _constants(ours, prefix.upper()), "FLAGS": _flags(prefix.upper()),
         "STRUCTS": _structs(ours), "SIZES": _sizes(ours, "f" if single_precision else "d"),
-        "DECLARATIONS": _declarations(ours.program), "ANGLES": _angles(ours, prefix.upper()),
+        "DECLARATIONS": "\n\n".join(declared(ours.program, ENTRIES)), "ANGLES": _angles(ours, prefix.upper()),
         "ROUNDINGS": str(roundings(ours)),
         "SOURCE_HASH": hashlib.sha256(source.encode()).hexdigest(),
     }  # fmt: skip
@@ -78,14 +78,6 @@ def _source(program: Program, prefix: str) -> str:
     words |= dict.fromkeys(("DESIGN_HASH", "SOURCE_HASH"), " ")
     parts = " ".join(f'"{word}" {upper}CONTROLLER_{name}' for name, word in words.items())
     return "\n".join([*head, f"const char {prefix}controller_version[] = {parts};", "", body])
-
-
-def _declarations(program: Program) -> str:
-    about = {
-        "controller_start": "State before the first tick: at rest at the measured angle.",
-        "controller_step": "One tick: measured values in, voltage out.  Call it every period.",
-    }
-    return "\n\n".join(f"/* {about[name]} */\n{text}" for name, text in program.declarations.items())
 
 
 def _flags(upper: str) -> str:

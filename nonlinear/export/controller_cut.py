@@ -25,7 +25,6 @@ from nonlinear.export.controller_names import SIGNAL_AT, member_name
 from nonlinear.native import parameters
 
 MOTOR_COUNTS, OUTPUT_COUNTS = layout.IO_SIZE, layout.IO_SIZE + 1  # places of inputs that are whole numbers
-_ENTRIES = ("controller_start", "controller_step")
 _SINGLE = {"STANDING": 1e-6}  # what is no change of a reference but rounding, in single precision
 
 
@@ -49,6 +48,10 @@ def controller_start(p, s):  # type: ignore[no-untyped-def]
     init_controller(p, s)
     init_estimate(p, s)
     init_command(p, s)
+
+
+ENTRIES = (controller_start, controller_step)
+_NAMES = tuple(each.__name__ for each in ENTRIES)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -81,7 +84,7 @@ def controller_of(design: Design, prefix: str, *, single_precision: bool = False
     structs = _structs(design, p, prefix, functions.values())
     rows = Rows(structs, float(p[layout.COUNTS_PER_RAD]))
     _zeroed(functions["controller_start"], structs["s"])
-    entries: dict[str, list[Kind]] = {name: ["row"] * len(functions[name].arguments) for name in _ENTRIES}
+    entries: dict[str, list[Kind]] = {name: ["row"] * len(functions[name].arguments) for name in _NAMES}
     program = emit_structs(functions, entries, prefix, rows)
     measured = {each.name: each for row in ("p", "io") for each in structs[row].members}
     structs["io"] = replace(structs["io"], members=tuple(measured.values()))
@@ -98,7 +101,7 @@ def _followed(p: Floats, single_precision: bool) -> dict[str, Leftover]:
         residual = Residual(partial(_look, p, constant), {counted: partial(_counts, p)}, named)
         residual.follow(controller_step).arguments = ("s", "io", "to")
         residual.follow(controller_start).arguments = ("s", "p")
-        functions = without_unread(residual.functions, _ENTRIES, partial(_owner, bounds))
+        functions = without_unread(residual.functions, _NAMES, partial(_owner, bounds))
         found = constant | _never_changed(functions, bounds)
         if found == constant:
             return functions

@@ -7,7 +7,7 @@ units are SI, motor side (linear axis: read N for N m, m for rad, kg for kg m2).
 import hashlib
 import inspect
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Iterable, Mapping
 from functools import cache
 from importlib.resources import files
 
@@ -22,7 +22,7 @@ from nonlinear._kernels.tick import get, set_state, tick
 HEAD = '#include "drive.h"\n\n#include <math.h>\n#include <stdbool.h>\n#include <stdlib.h>\n'
 
 _ROW: Kind = "row"
-ENTRIES: dict[object, tuple[Kind, ...]] = {
+ENTRIES: dict[Callable[..., object], tuple[Kind, ...]] = {
     prepare_sizes: (_ROW,),
     derive: (_ROW, _ROW),
     init: (_ROW, _ROW),
@@ -44,17 +44,6 @@ FLAGS = {
        for name, bit in zip(at.LIMITERS, at.LIMITER_BITS, strict=True)},
     ("FLAG_AT_REST", at.FLAG_STICK): "the rotor is held by friction",
 }  # fmt: skip
-_ABOUT = {
-    "prepare_sizes": "Works out the lengths of p and s; call it first, and after every change of p.",
-    "derive": "Derives all that does not change with time; call it after `prepare_sizes`.",
-    "init": "State at the first tick, from the start values in p.",
-    "tick": "Sense, control and move by one period; returns a status.  Inputs io[DRIVE_IN_...] are held.",
-    "control_tick": "The controller alone, on measured current, speed and angle in io; returns the voltage.",
-    "part_of_tick": "The first tau seconds of a tick, on a copy of the state; writes over q, a copy of p.",
-    "retune": "Fits the state to parameters changed between two ticks, after `derive`.",
-    "get": "Copies the state out, p[DRIVE_STATE_SIZE] numbers.",
-    "set_state": "Copies a state in.",
-}
 _LINE = re.compile(
     r"^\s*(?P<name>[A-Z][A-Z_0-9]*)(?:,|(?:: \w+)? =[^#]*)\s*"
     r"(?:#\s*(?P<words>[^\[]*?)\s*(?:\[(?P<unit>.*)\])?)?$"
@@ -158,10 +147,16 @@ def header_text() -> str:
         ("Bits of io[DRIVE_IO_FLAGS]", list(FLAGS)),
     )
     blocks = "\n".join(_enum(title, items) for title, items in groups)
-    heads = "\n".join(f"/* {_ABOUT[name]} */\n{text}" for name, text in program().declarations.items())
     sizes = f"enum {{\n    DRIVE_RUN_SIZE = {at.SIZE}, /* parameters of a run */\n"
     sizes += f"    DRIVE_IO_LENGTH = {at.IO_SIZE}\n}};"
-    return filled("drive.h", {"BLOCKS": blocks, "FUNCTIONS": heads, "SIZES": sizes})
+    functions = "\n".join(declared(program(), ENTRIES))
+    return filled("drive.h", {"BLOCKS": blocks, "FUNCTIONS": functions, "SIZES": sizes})
+
+
+def declared(emitted: Program, functions: Iterable[Callable[..., object]]) -> list[str]:
+    """Declarations of functions, each below the first line of what it says of itself."""
+    about = {each.__name__: (inspect.getdoc(each) or "").partition("\n")[0] for each in functions}
+    return [f"/* {about[name]} */\n{text}" for name, text in emitted.declarations.items()]
 
 
 def _enum(title: str, items: list[tuple[str, int]]) -> str:
