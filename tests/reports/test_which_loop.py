@@ -18,7 +18,7 @@ from actuator_lti.loops.commanded import commanded_bandwidth, commanded_step
 from actuator_lti.loops.limiters import onset
 from actuator_lti.step import step_figures
 from analyses.isolation import isolated
-from analyses.large_signal.from_rest import free_amplitude, sweep_from_rest
+from analyses.large_signal.from_rest import sweep_from_rest
 from analyses.large_signal.map import amplitude_map
 from analyses.linear.loop_figures import all_loop_figures
 from analyses.linear.responses import answer_curve, response_at
@@ -85,7 +85,10 @@ def test_a_sine_from_rest_is_compared_with_the_response_to_the_command() -> None
     friction = replace(SCREW.friction, dry_torque_Nm=0.0, load_coefficient=0.0)
     still = replace(SCREW, friction=friction, load=replace(SCREW.load, friction=None))
     hz, loops = np.array([2.0, 5.0, 9.0, 20.0]), assemble_loops(still)
-    sweep = sweep_from_rest(still, hz, free_amplitude(still, loops, hz, 1.0), 40_000)
+    least = np.minimum(
+        still.validation.full_deflection_rad, 0.5 * onset(loops, 2.0 * np.pi * hz).amplitude_rad
+    )
+    sweep = sweep_from_rest(still, hz, least, 40_000)
     assert np.abs(sweep.measured / sweep.sliding - 1.0).max() < 1e-3
     large = amplitude_map(still, loops, friction_on=False, counts=(3, 6))
     omega = 2.0 * np.pi * large.frequency_hz[:5]  # the last one is near Nyquist: the images of a held signal
