@@ -1,8 +1,6 @@
 """Every bound that keeps a hostile or mistaken input from taking the memory, the disk or the night.
 
-One table: what is bounded, by how much, which option or key asks for it, and why so much. Whoever
-allocates asks the bound first (`Bound.check`); ``python -m actuator_lti.bounds`` writes the table as
-Markdown for the documentation.
+Whoever allocates asks the bound first (`Bound.check`); ``python -m actuator_lti.bounds`` writes the table.
 """
 
 import sys

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from math import isfinite
 from numbers import Integral
@@ -43,10 +43,7 @@ def in_file(where: str) -> Iterator[None]:
 
 
 class Mistakes(InputError):
-    """Several mistakes of one file, each on a line of its own as its `InputError` has it.
-
-    ``mistakes``: at least two, in the order of the file.
-    """
+    """Several mistakes of one file, in its order, each on a line of its own as its `InputError` has it."""
 
     def __init__(self, mistakes: Sequence[InputError]) -> None:
         super().__init__(mistakes[0].message, mistakes[0].where)
@@ -80,8 +77,10 @@ class TooManyTicks(NumericalError):
     """Runs that would take longer than anybody waits for; nothing has been computed."""
 
 
-def finite_number(name: str, value: Any, allowed: str = "a finite number, in SI") -> float:
-    """An argument that is one finite real number; anything else is refused with what is allowed.
+def finite_number(
+    name: str, value: Any, allowed: str = "a finite number, in SI", holds: Callable[[float], bool] = isfinite
+) -> float:
+    """An argument that is one finite real number that ``holds``; else refused with what is allowed.
 
     >>> finite_number("load_Nm", "4 N*m")
     Traceback (most recent call last):
@@ -91,24 +90,17 @@ def finite_number(name: str, value: Any, allowed: str = "a finite number, in SI"
         number = float("nan" if isinstance(value, str | bytes | bool) else value)
     except (TypeError, ValueError, OverflowError):
         number = float("nan")
-    if not isfinite(number):
+    if not (isfinite(number) and holds(number)):
         raise InputError(f"{name} = {shown(value)}: must be {allowed}")
     return number
 
 
 def positive_number(name: str, value: Any) -> float:
-    """An argument that is one finite number above 0."""
-    if (number := finite_number(name, value, allowed := "positive and finite, in SI")) <= 0.0:
-        raise InputError(f"{name} = {shown(value)}: must be {allowed}")
-    return number
+    return finite_number(name, value, "positive and finite, in SI", lambda number: number > 0.0)
 
 
 def delay_number(delay_s: Any) -> float:
-    """A delay in s that is one finite number and not negative."""
-    allowed = "finite and not negative, in s"
-    if (number := finite_number("delay_s", delay_s, allowed)) < 0.0:
-        raise InputError(f"delay_s = {shown(delay_s)}: must be {allowed}")
-    return number
+    return finite_number("delay_s", delay_s, "finite and not negative, in s", lambda number: number >= 0.0)
 
 
 def whole_number(name: str, value: Any, least: int = 1) -> int:

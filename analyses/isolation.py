@@ -1,8 +1,4 @@
-"""Parts of a report that fail alone: what nobody foresaw in one leaves the others standing, and is noted.
-
-`attempt` catches everything only inside `isolated`, that is where somebody promises to show what is missing;
-elsewhere an error goes its way.
-"""
+"""Parts of a report that fail alone and are noted, where missing parts are shown (`isolated`)."""
 
 import traceback
 from collections.abc import Callable, Iterable, Iterator
@@ -63,10 +59,7 @@ def note(missing: Iterable[Missing]) -> None:
 
 
 def attempt(part: str, work: Callable[[], T], otherwise: U) -> T | U:
-    """Do some work; inside `isolated`, note a failure and go on with ``otherwise``.
-
-    Bad input is no failure: `InputError` always goes its way.
-    """
+    """Do some work; `isolated` notes a failure and goes on with ``otherwise``, but for an `InputError`."""
     if _noted.get() is None:
         return work()
     result, missing = caught(part, work)

@@ -1,8 +1,7 @@
 """Tables of TOML as dataclasses: a key is a field by its name without the unit, and no other key is taken.
 
-The type of a field says what is read: a text, one of some (``Literal``), a file, a flag, a whole number, a
-number, a list of texts, a column (name or number) or, ``Annotated`` with its unit, a quantity. A field that
-has no default has to be given. Every fault is told with key, value and what is allowed.
+The type of a field says what is read: `WANTED`, one of some (``Literal``), a list of texts or, ``Annotated``
+with its unit, a quantity. One without a default has to be given.
 """
 
 from __future__ import annotations

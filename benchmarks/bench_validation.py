@@ -24,7 +24,7 @@ def rows(quick: bool = False) -> Iterable[Row]:
     def small(design: Design) -> list[object]:
         """The rows that the tangents of all places judge."""
         bench = Bench(design, design)
-        return [small_signal(place) for place in (*bench.places(), *bench.onsets())]
+        return [small_signal(place) for place in (*map(bench.place, bench.names), *bench.onsets())]
 
     names = ("ilr33-amber",) if quick else shipped_designs()
     validate(load_design(names[0]), CHECKS)

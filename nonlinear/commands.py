@@ -79,14 +79,14 @@ class Command:
             return 0.0
         times, values = self.samples
         even = np.linspace(times[0], times[-1], times.size)
+        above = np.fft.rfftfreq(even.size, even[1] - even[0]) > nyquist_hz
         y = np.interp(even, times, values / (np.abs(values).max() or 1.0))
         y = y - np.linspace(y[0], y[-1], y.size)
         size = float(np.ptp(y))
-        if size == 0.0:
+        if size == 0.0 or not above.any():  # of samples at the ticks no line is
             return 0.0
         lines = 4.0 * np.abs(np.fft.rfft(y * np.hanning(y.size))) / y.size
-        above = np.fft.rfftfreq(y.size, even[1] - even[0]) > nyquist_hz
-        return float(lines[above].max(initial=0.0)) / (0.5 * size)
+        return float(lines[above].max()) / (0.5 * size)
 
     def table(self, period_s: float, ticks: int) -> Floats | None:
         """Values at the ticks of a tabulated command, linear between its points; ``None`` for the others."""

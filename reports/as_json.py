@@ -2,6 +2,7 @@
 
 import re
 from dataclasses import fields
+from functools import reduce
 from math import degrees
 from pathlib import PurePath
 from typing import Any
@@ -61,13 +62,8 @@ def on_a_line(data: Any) -> Any:
         return [on_a_line(item) for item in data]
     if not isinstance(data, dict):
         return data
-    return {_on_a_line(key): on_a_line(item) for key, item in data.items()}
-
-
-def _on_a_line(name: str) -> str:
-    for of, line in _LINEAR:
-        name = of.sub(line, name)
-    return name
+    named = {reduce(lambda name, one: one[0].sub(one[1], name), _LINEAR, key): key for key in data}
+    return {name: on_a_line(data[key]) for name, key in named.items()}
 
 
 _OF_MARGINS = (

@@ -112,14 +112,10 @@ def design_report(
             point = attempt("weakest point", lambda: weakest(survey, bounds), None)
     loops, validation = in_amperes(loops, design), in_amperes(validation, design)
     first = [part for part in validation if part["id"] == "validation"]
-    sections = [
-        *loops[:1],
-        *first,
-        *loops[1:],
-        *(part for part in validation if part not in first),
-        parameters.section(design, warnings_of(design)),
-        parameters.provenance(head, origin, checked=bool(first)),
-    ]
+    others = (part for part in validation if part not in first)
+    sources = parameters.section(design, warnings_of(design))
+    sections = [*loops[:1], *first, *loops[1:], *others, sources]
+    sections.append(parameters.provenance(head, origin, checked=bool(first)))
     doc.waived(sections, design)
     with isolated() as unanswered:
         items = doc.judged(doc.walk(loops[0])) if loops else []
@@ -196,5 +192,5 @@ def loop_sections(survey: LoopSurvey, verdicts: Sequence[RequirementVerdict]) ->
         makers["Stiffness"] = lambda: stiffness.of_design(design)
     if onset is not None:
         makers["Limits"] = lambda: limits.section(design, onset)
-    made = [attempt(f"section {name}", make, None) for name, make in makers.items()]
+    made = (attempt(f"section {name}", make, None) for name, make in makers.items())
     return [part for part in made if part is not None]

@@ -146,9 +146,8 @@ def listing(
     """
     rows = []
     for item in items:
-        own = {"_status": status(item)} if status else {}
-        said = more(item) if more else {}
-        rows.append({**{one["key"]: read(item) for one, read in columns}, **own, **said})
+        said = ({"_status": status(item)} if status else {}) | dict(more(item) if more else {})
+        rows.append({**{one["key"]: read(item) for one, read in columns}, **said})
     return table(caption, [one for one, _ in columns], rows, note)
 
 

@@ -4,6 +4,7 @@ The compiled code is measured.
 """
 
 from collections.abc import Iterable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, distribution
 from pathlib import Path
@@ -126,10 +127,9 @@ def licence_text() -> str:
     beside = Path(__file__).resolve().parent.parent / "LICENSE"
     if beside.is_file():
         return beside.read_text(encoding="utf-8")
-    try:
+    with suppress(PackageNotFoundError):
         return distribution("actuator-lti").read_text("licenses/LICENSE") or "MIT"
-    except PackageNotFoundError:
-        return "MIT"
+    return "MIT"
 
 
 GROUPS = (

@@ -58,11 +58,8 @@ def controller_boxes(design: Design) -> list[Box]:
     if c.velocity is not None:
         integral = c.velocity.integral_time_s
         boxes.append(("velocity", "P" if integral is None else f"PI {seconds(integral)}"))
-    if c.current is not None:
-        boxes.append(("current", _limit(design.limits.peak_current_A, "A")))
-    boxes.append(("voltage", _limit(design.limits.voltage_V, "V")))
-    boxes.append(("tick", f"{1e6 * c.period_s:.4g} us"))
-    return boxes
+    boxes += [("current", _limit(design.limits.peak_current_A, "A"))] if c.current else []
+    return [*boxes, ("voltage", _limit(design.limits.voltage_V, "V")), ("tick", f"{1e6 * c.period_s:.4g} us")]
 
 
 def _limit(value: float, unit: str) -> str:

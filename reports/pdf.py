@@ -94,12 +94,20 @@ def printable(made: Mapping[str, Any]) -> Tree:
     design, origin = made.get("design") or {}, made.get("provenance") or {}
     every = (block for part in made["sections"] for block in walk(part))
     own = (block for block in every if block.get("what", "requirements") == "requirements")
+    rows = [
+        ("Design", design.get("name")),
+        ("Revision", design.get("revision") or "not stated"),
+        ("Hash of the design", origin.get("design_hash")),
+        ("Computed by", f"actuator-lti {origin.get('version') or ''}"),
+        ("Commit", origin.get("commit")),
+        ("Date", origin.get("time")),
+    ]
     return {
         "kicker": KICKERS.get(made.get("kind", "report"), "Report"),
         "title": clean(made.get("title"), MAX_TITLE),
         "subtitle": clean(made.get("subtitle"), 1200),
         "overall": [[clean(words, 200), status] for words, status in verdict_lines(made["verdict"])],
-        "facts": _facts(design, origin),
+        "facts": [[label, clean(value, 200)] for label, value in rows if value],
         "revision": clean(design.get("revision"), 60),
         "verdicts": [_verdict(item) for item in judged(own)],  # what is signed
         "sections": [_section(part, drawings) for part in made["sections"]],
@@ -118,18 +126,6 @@ def clean(value: object, limit: int = MAX_CELL) -> str:
     return _LONG_WORD.sub(lambda m: "\u200b".join(re.findall(r".{1,12}", m.group())), text)
 
 
-def _facts(design: Mapping[str, Any], origin: Mapping[str, Any]) -> list[list[str]]:
-    rows = [
-        ("Design", design.get("name")),
-        ("Revision", design.get("revision") or "not stated"),
-        ("Hash of the design", origin.get("design_hash")),
-        ("Computed by", f"actuator-lti {origin.get('version') or ''}"),
-        ("Commit", origin.get("commit")),
-        ("Date", origin.get("time")),
-    ]
-    return [[label, clean(value, 200)] for label, value in rows if value]
-
-
 def _verdict(item: Mapping[str, Any]) -> Tree:
     limit = f"{item.get('comparison') or ''} {show(item.get('limit'), 'short:6')}".strip()
     value, distance = show(item.get("value"), "sig:4"), show_signed(item.get("distance"))
@@ -144,18 +140,8 @@ def _verdict(item: Mapping[str, Any]) -> Tree:
 
 
 def _section(part: Mapping[str, Any], drawings: Mapping[int, str]) -> Tree:
-    return {
-        "title": clean(part["title"], MAX_TITLE),
-        "intro": clean(f"{part.get('result') or ''} {part.get('intro') or ''}".strip(), MAX_TEXT),
-        "status": part["status"],
-        "blocks": _paired(part["blocks"], drawings),
-    }
-
-
-def _paired(own: Sequence[Mapping[str, Any]], drawings: Mapping[int, str]) -> list[Tree]:
-    """Half-wide figures that follow each other stand in pairs beside each other."""
     blocks: list[Tree] = []
-    for block in own:
+    for block in part["blocks"]:
         printed = _block(block, drawings)
         if printed["kind"] != "figure" or block.get("layout", "wide") == "wide":
             blocks.append(printed)
@@ -163,7 +149,12 @@ def _paired(own: Sequence[Mapping[str, Any]], drawings: Mapping[int, str]) -> li
             blocks[-1]["figures"].append(printed)
         else:
             blocks.append({"kind": "row", "figures": [printed]})
-    return blocks
+    return {
+        "title": clean(part["title"], MAX_TITLE),
+        "intro": clean(f"{part.get('result') or ''} {part.get('intro') or ''}".strip(), MAX_TEXT),
+        "status": part["status"],
+        "blocks": blocks,
+    }
 
 
 def _block(block: Mapping[str, Any], drawings: Mapping[int, str]) -> Tree:
@@ -171,7 +162,12 @@ def _block(block: Mapping[str, Any], drawings: Mapping[int, str]) -> Tree:
     if kind == "table":
         return _table(block)
     if kind == "figure":
-        return _figure(block, drawings[id(block)])
+        svg = drawings[id(block)]
+        size = _SIZE.search(svg)
+        most = LINE_PT if block.get("layout", "wide") == "wide" else HALF_PT
+        width = min(most, SCALE * float(size[1])) if size else most
+        texts = {"caption": clean(block["caption"], 2000), "alt": clean(block["alt"], 2000)}
+        return {"kind": "figure", "svg": visible(svg), "width": width, **texts}
     if kind == "facts":
         values = [f"{clean(shown_fact(i), 300)} {clean(i['unit'], 30)}".strip() for i in block["items"]]
         labels = [clean(i["label"], 200) for i in block["items"]]
@@ -202,15 +198,6 @@ def _glance(block: Mapping[str, Any]) -> Tree:
     words += [item["text"] for item in block["findings"]]
     note = clean(" ".join(words), 2000)
     return {"kind": "table", "caption": "Each loop", "note": note, "columns": columns, "rows": rows}
-
-
-def _figure(block: Mapping[str, Any], svg: str) -> Tree:
-    """Scale every figure alike, so that their lettering is the same; half-wide ones stand in pairs."""
-    size = _SIZE.search(svg)
-    most = LINE_PT if block.get("layout", "wide") == "wide" else HALF_PT
-    width = min(most, SCALE * float(size[1])) if size else most
-    texts = {"caption": clean(block["caption"], 2000), "alt": clean(block["alt"], 2000)}
-    return {"kind": "figure", "svg": visible(svg), "width": width, **texts}
 
 
 def _table(block: Mapping[str, Any]) -> Tree:

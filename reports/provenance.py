@@ -46,12 +46,10 @@ def build_time() -> str:
 def commit() -> str | None:
     """Give the git commit of the source tree, with ``+changes`` where it differs; ``None`` outside of git."""
     root = Path(__file__).resolve().parent.parent
-    if not (root / ".git").exists():
-        return None
-    head = git(root, "rev-parse", "HEAD")
+    head = git(root, "rev-parse", "HEAD") if (root / ".git").exists() else None
     if head is None:
         return None
-    return head + ("+changes" if git(root, "status", "--porcelain", "--untracked-files=no") else "")
+    return head + "+changes" * bool(git(root, "status", "--porcelain", "--untracked-files=no"))
 
 
 def git(place: Path, *arguments: str) -> str | None:
@@ -59,8 +57,7 @@ def git(place: Path, *arguments: str) -> str | None:
 
     A work tree is data: nothing that its own configuration names is started.
     """
-    program = shutil.which("git")
-    folder = place if place.is_dir() else place.parent
+    program, folder = shutil.which("git"), place if place.is_dir() else place.parent
     if program is None or not folder.is_dir():
         return None
     environment = {name: os.environ[name] for name in ("HOME", "SYSTEMROOT") if name in os.environ}

@@ -101,7 +101,15 @@ def _parts(block: Mapping[str, Any], wrapped: int, out: Console) -> Iterator[Tab
 
 def _laid(block: Mapping[str, Any], wrapped: int, out: Console) -> Table:
     if block.get("turned"):
-        return _turned(block)
+        first, *others = block["columns"]
+        made = _empty(block["caption"])
+        made.add_column("")
+        for row in block["rows"]:
+            made.add_column(_cell(row[first["key"]], first["format"]), justify="right")
+        for column in others:
+            cells = (_cell(row.get(column["key"], ""), column["format"]) for row in block["rows"])
+            made.add_row(Text(_label(column)), *cells)
+        return made
     laid = table(block, wrapped)
     if Measurement.get(out, out.options.update(width=10_000), laid).maximum > out.width:
         laid = table(block, wrapped, narrow=True)
@@ -148,7 +156,7 @@ def _list(text: Text, said: Iterable[tuple[Mapping[str, Any], Any]]) -> None:
     there = [(column, cell) for column, cell in cells if cell.plain.strip() not in ("", "–")]
     for number, (column, cell) in enumerate(there):
         label = column["label"] if column["label"] != "Unit" else ""
-        between = " " if column["label"] == "Unit" else ", " if label in ("", "at") else "; "
+        between = " " if column["label"] == "Unit" else ", " if label in GOES_ON else "; "
         text.append(between if number else "")
         text.append(f"{label} ".lstrip()).append_text(cell).append(f" {column['unit']}".rstrip())
 
@@ -163,18 +171,6 @@ def side_by_side(title: str, blocks: Sequence[Mapping[str, Any]]) -> Mapping[str
             one = rows.setdefault(row[first["key"]], {head["key"]: row[first["key"]]})
             one |= {column["key"]: row.get(column["key"]) for column in others}
     return {**doc.table(title, [head, *columns], rows.values()), "turned": True}
-
-
-def _turned(block: Mapping[str, Any]) -> Table:
-    first, *others = block["columns"]
-    made = _empty(block["caption"])
-    made.add_column("")
-    for row in block["rows"]:
-        made.add_column(_cell(row[first["key"]], first["format"]), justify="right")
-    for column in others:
-        cells = (_cell(row.get(column["key"], ""), column["format"]) for row in block["rows"])
-        made.add_row(Text(_label(column)), *cells)
-    return made
 
 
 def _label(column: Mapping[str, Any]) -> str:

@@ -29,10 +29,7 @@ def drive_figure(design: Design, name: str, load_Nm: float = 0.0) -> Any:
 
 
 def drive_figures(population: Population, quantity: str, load_Nm: float = 0.0) -> np.ndarray:
-    """The same of every design at a load torque, shape (count,).
-
-    Raises `InputError`: for another quantity, or the current of an ideal torque source.
-    """
+    """The same of every design, shape (count,); an InputError for the current of an ideal source."""
     if quantity == "motor_current" and not population.design.motor.has_electrical_dynamics:
         raise InputError("motor_current: an ideal torque source has no current")
     known = DRIVE_QUANTITIES.get(quantity)

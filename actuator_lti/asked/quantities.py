@@ -1,8 +1,6 @@
 """The registry of figures that a requirement may limit: each declared once, what reads them loops over it.
 
-A figure of a loop is read from an object with the parts ``margins``, ``bandwidth`` and ``step`` (one
-design), or is a column of `actuator_lti.batch.LinearFigures` of its own name (many). A figure of the whole
-drive is an attribute of what `source` names, for one design or many (`actuator_lti.asked.drive_figure`).
+Those of a loop are read from ``margins``, ``bandwidth`` and ``step``, or a column of `LinearFigures` (many).
 """
 
 from __future__ import annotations
@@ -42,14 +40,10 @@ class Quantity:
 
     name: str  # as a requirement names it
     unit: str  # in reports
-    # ``analysis``: of one design at a time, by `analyses.specification.asked_figures`; studies of many leave
-    # it out
-    scope: Literal["loop", "drive", "analysis"]
+    scope: Literal["loop", "drive", "analysis"]  # of an analysis: one design at a time, studies leave it out
     description: str  # how it is defined, for people who write requirements
     words: str  # what reports call it
-    # Where it is found: ``"margins.gain_margin_db"``, or an attribute of what `source` names; empty where
-    # `cornered`
-    reader: str
+    reader: str  # "margins.gain_margin_db", or an attribute of what `source` names; empty where `cornered`
     better: Literal[1, -1]  # whether larger or smaller is better
     linear_unit: str = ""  # in reports of a linear axis, where that differs
     absolute: bool = False  # whether its magnitude counts: a gain margin down as one up, a lead as a lag
@@ -61,15 +55,10 @@ class Quantity:
     source: Literal["loop", "capability", "stiffness", "analysis"] = "loop"
     heading: str = ""  # what the tables of a report call its column; empty where they have none
     title: str = ""  # what stands beside its number elsewhere; `words` with a capital where left out
-    # How the first screen of a report writes it, such as ``fix:1``; empty where it does not show it
-    at_a_glance: str = ""
+    at_a_glance: str = ""  # how the first screen of a report writes it, such as ``fix:1``; empty: not
     followed: bool = False  # whether the table of the live page shows it
-    # The figure of a loop whose least over loops and corners it is: `analyses.corners` then has a corner with
-    # the worst ends of the tolerances for that figure
-    cornered: str = ""
-    # In its unit: a smaller difference between two nights is rounding. A part in a thousand of the figure,
-    # where that is more, counts as none in any case.
-    tolerance: float = 1e-9
+    cornered: str = ""  # the figure of a loop whose least over loops and corners it is (`analyses.corners`)
+    tolerance: float = 1e-9  # in its unit: nights that differ by less, or by a part in a thousand, are equal
 
     @property
     def label(self) -> str:

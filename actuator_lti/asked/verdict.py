@@ -1,7 +1,6 @@
 """The three words for whatever is judged: met, not met, not proven; their colour, count and exit status.
 
-Not proven is what cannot be judged: a figure that there is not, a margin that is withheld, a loop that the
-drive lacks. It is neither good nor bad, and does not let a command end with 0, unless it is waived (of what
+Not proven is what cannot be judged. It does not let a command end with 0, unless it is waived (of what
 records of a bench do not tell: unless something fails).
 """
 

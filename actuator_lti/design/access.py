@@ -6,9 +6,9 @@ from math import inf
 from typing import Any
 
 from actuator_lti.design.asked import FrozenMap, Parameter
-from actuator_lti.design.checks import check_relations
+from actuator_lti.design.checks import contradictions
 from actuator_lti.design.fields import Field, Structure, field_of, fields_in, part_at, parts_of, with_part
-from actuator_lti.design.mistakes import nearest
+from actuator_lti.design.mistakes import Findings, nearest
 from actuator_lti.design.model import Design
 from actuator_lti.design.tolerances import rescaled
 from actuator_lti.design.units import ampere_unit, si_text
@@ -46,9 +46,7 @@ def located(design: Design, path: str) -> tuple[Field, Any]:
 
 
 def parameter_value(design: Design, path: str) -> float:
-    """The SI value of a numeric key by its dotted path, such as ``"gear.worm.ratio"``.
-
-    An InputError if the key is unknown, or this design has no value for it.
+    """The SI value of a numeric key by its dotted path; an InputError where the design has none.
 
     >>> from actuator_lti.design import load_design
     >>> parameter_value(load_design("ilr33-amber"), "motor.resistance")
@@ -64,11 +62,8 @@ def parameter_value(design: Design, path: str) -> float:
 def with_values(design: Design, values: Mapping[str, float], *, check: bool = True) -> Design:
     """A copy of a design with some numeric keys, by their dotted paths, changed to SI values.
 
-    Its parameters carry the new values; a tolerance in percent follows them, one cut at limits that a value
-    leaves is gone (a design file is refused for that). ``check``: whether the relations
-    between keys are checked too (kE against kM, speed against supply); each value alone always is.
-
-    An InputError as :func:`actuator_lti.design.load_design`.
+    A tolerance in percent follows its value, one cut at limits that a value leaves is gone. ``check``:
+    whether the relations between keys are checked too (kE against kM); each value alone always is.
 
     >>> from actuator_lti.design import load_design
     >>> with_values(load_design("ilr33-amber"), {"motor.resistance": 0.06}).motor.resistance_ohm
@@ -82,12 +77,11 @@ def with_values(design: Design, values: Mapping[str, float], *, check: bool = Tr
         correlations=tuple(pair for pair in design.correlations if not gone & {pair.first, pair.second}),
     )
     if check:
-        check_relations(changed, design.origin or design.name)
+        Findings(design.origin or design.name).refuse(contradictions(changed))
     return changed
 
 
 def _changed(design: Design, path: str, value: float) -> Parameter:
-    """A changed value, which its key allows, with its pedigree."""
     (field, _), old = located(design, path), design.parameters.get(path)
     if isinstance(value, bool) or not hasattr(value, "__float__"):
         raise InputError(f"{path} = {shown(value)}: allowed: a number")

@@ -30,10 +30,7 @@ ObjectFamily = Literal["", "faulhaber-mc-v3"]
 
 @dataclass(frozen=True, kw_only=True)
 class Failure:
-    """What is asked of the failure cases; ``None`` is what `analyses.failures.Asked` takes for it.
-
-    Deflections are those of the output from where it was; the load pushes forward from the start.
-    """
+    """What is asked of the failure cases: deflections from where the output was, a load from the start."""
 
     stop_rad: Annotated[float | None, positive("mechanical stop; default the full deflection",
         example="25 deg")] = None
@@ -129,8 +126,7 @@ class Requirement:
 class Waiver:
     """Leave to go on while a requirement or a check is not proven; one that is not met stays so."""
 
-    # As reports have it, ``id/loop`` of a requirement on every loop
-    requirement: Annotated[str, text("id of the requirement or check")]
+    requirement: Annotated[str, text("id of the requirement or check")]  # ``id/loop`` of one on every loop
     reason: Annotated[str, label("reason for the waiver")]
     date: Annotated[str, day("day of the waiver")]
 
@@ -165,14 +161,12 @@ class Tolerance:
     kind: Literal["uniform", "normal", "truncated-normal"]
     half_width: float | None = None
     std: float | None = None
-    # Values of the parameter itself, not deviations
-    lower: float = -inf
+    lower: float = -inf  # a value of the parameter itself, no deviation; so is `upper`
     upper: float = inf
     text: str = ""  # the width as written, so that a relative one ("50 %") follows a changed nominal
 
     @property
     def relative(self) -> bool:
-        """Whether the width is a share of the value."""
         return self.text.strip().endswith("%")
 
 
@@ -214,7 +208,6 @@ class ObjectPlace:
 
     @property
     def label(self) -> str:
-        """The usual spelling, such as ``0x2344.01``."""
         return f"0x{self.index:04X}.{self.subindex:02X}"
 
 
@@ -231,9 +224,7 @@ class ControllerObject(ObjectPlace):
 class ControllerObjects:
     """The controller's own settings that a design was imported from, also those that no key holds."""
 
-    # Turns the unit of object 0x2344.01 into A s/rad: 1 if it is per rad/s, 9.549 (60/2 pi) if it is per rpm;
-    # the documents do not settle it
-    velocity_gain_factor: float = 1.0
+    velocity_gain_factor: float = 1.0  # 1 if 0x2344.01 is per rad/s, 60/2 pi if per rpm; no document says
     values: tuple[ControllerObject, ...] = ()  # in the order of index and subindex
     family: ObjectFamily = ""  # by which the drive is run: its gains have the ranges and steps of its objects
 

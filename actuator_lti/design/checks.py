@@ -1,7 +1,7 @@
 """Physics across keys: what cannot be is refused; what is only suspicious is warned of (`suspicions`)."""
 
 import re
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator
 from contextlib import suppress
 from dataclasses import replace
 
@@ -21,24 +21,10 @@ CHECKS = "validation"  # what the ids of checks by simulation begin with
 
 
 def check_design(design: Design, where: str) -> None:
-    """Refuse a design of the file ``where`` that none may hold: values out of range, or that contradict.
-
-    The InputError names all at once: key, value and what is allowed.
-    """
-    _refuse(misplaced(design), where)
-    _refuse(out_of_range(design), where)  # the relations ask for numbers that are some
-    check_relations(design, where)
-
-
-def check_relations(design: Design, where: str) -> None:
-    """Refuse a design whose values, each in its range, contradict each other; as `check_design`."""
-    _refuse(contradictions(design), where)
-
-
-def _refuse(refusals: Iterable[Refusal], where: str) -> None:
-    findings = Findings(where)
-    findings.extend(refusals)
-    findings.refuse()
+    """Refuse what no file may hold, values out of range or that contradict: all at once, by an InputError."""
+    Findings(where).refuse(misplaced(design))
+    Findings(where).refuse(out_of_range(design))  # the relations ask for numbers that are some
+    Findings(where).refuse(contradictions(design))
 
 
 def misplaced(design: Design) -> Iterator[Refusal]:
@@ -77,18 +63,13 @@ def out_of_range(design: Design) -> Iterator[Refusal]:
 
 def contradictions(design: Design) -> Iterator[Refusal]:
     """What the relations between keys refuse, of all those whose own keys are read; numbers with units."""
-    for refusal in _contradictions(design):
-        yield _with_unit(design, *refusal)
-
-
-def _with_unit(design: Design, path: str, given: object, allowed: str) -> Refusal:
-    """A refusal whose value, where it is a number alone, has the unit of its key."""
-    field = FIELDS.get(template_of(path))
-    number = isinstance(given, float) or (isinstance(given, str) and _NUMBER.match(given))
-    with suppress(UnreadError):
-        if number and field is not None and (unit := field.unit(Structure.of(design))) != "1":
-            given = f"{float(f'{given}'):g} {unit}"
-    return path, given, allowed
+    for path, given, allowed in _contradictions(design):
+        field = FIELDS.get(template_of(path))
+        number = isinstance(given, float) or (isinstance(given, str) and _NUMBER.match(given))
+        with suppress(UnreadError):
+            if number and field is not None and (unit := field.unit(Structure.of(design))) != "1":
+                given = f"{float(f'{given}'):g} {unit}"
+        yield path, given, allowed
 
 
 def _contradictions(design: Design) -> Iterator[Refusal]:
@@ -137,24 +118,18 @@ def _requirements(design: Design) -> Iterator[Refusal]:
         if not named and item.id is not UNREAD:
             yield f"{path}.id", shown(item.id), "allowed: each id once"
         known += [item.id] if named else []
-        for check in (_limited, _not_negative, _in_order, _of_loop, _of_rotor, _of_response):
+        for check in (_limits, _of_loop, _of_rotor, _of_response):
             yield from readable(check(design, path, item))
 
 
-def _limited(_: Design, path: str, item: Requirement) -> Iterator[Refusal]:
+def _limits(_: Design, path: str, item: Requirement) -> Iterator[Refusal]:
     if item.minimum is None and item.maximum is None:
         yield path, "", "missing limit; allowed: minimum, maximum or both"
-
-
-def _not_negative(_: Design, path: str, item: Requirement) -> Iterator[Refusal]:
-    signed = QUANTITIES[item.quantity].signed
+    signed = QUANTITIES[item.quantity].signed  # no limit is read of a quantity that is none
     for key, limit in (("minimum", item.minimum), ("maximum", item.maximum)):
         if limit is not None and limit is not UNREAD and limit < 0.0 and not signed:
             allowed = f"allowed: at least {with_unit(0.0, item.unit)}"
             yield f"{path}.{key}", with_unit(limit, item.unit), allowed
-
-
-def _in_order(_: Design, path: str, item: Requirement) -> Iterator[Refusal]:
     if item.minimum is not None and item.maximum is not None and item.minimum > item.maximum:
         least, most = with_unit(item.minimum, item.unit), with_unit(item.maximum, item.unit)
         yield f"{path}.minimum", least, f"allowed: at most maximum = {most}"
@@ -185,7 +160,6 @@ def _of_response(design: Design, path: str, item: Requirement) -> Iterator[Refus
 
 
 def _waivers(design: Design) -> Iterator[Refusal]:
-    """Each for a requirement of the file, on one loop or on all, or for a check by simulation."""
     known = {item.id for item in design.requirements}
     seen: set[str] = set()
     for id in (item.requirement for item in design.waivers):

@@ -41,7 +41,6 @@ def _filter_key(item: Filter, field: Field, path: str, nyquist: float) -> Iterat
 
 
 def _biquad(item: Filter, path: str, key: str, most: int, words: str) -> Iterator[Refusal]:
-    """Its numerator or its denominator, of two at most."""
     values = getattr(item, key)
     if item.kind == "biquad" and len(values) > most:
         yield f"{path}.{key}", f"{len(values)} values", f"allowed: {words}"
@@ -58,7 +57,6 @@ def _filter_count(design: Design) -> Iterator[Refusal]:
 
 
 def _tracking(design: Design) -> Iterator[Refusal]:
-    """A tracking loop of the encoder, and its bandwidth."""
     encoder, w0 = design.encoder, design.encoder.bandwidth_rad_s
     most = TRACKING_LIMIT / design.controller.period_of("velocity")
     if encoder.speed != "tracking" and w0 is not None:
@@ -101,7 +99,6 @@ _PROFILE = {"rate": ("", "speed"), "acceleration": ("rate", "acceleration"), "je
 
 
 def _command_filter(design: Design) -> Iterator[Refusal]:
-    """Its frequency has to lie below pi/T of the stage that takes the command."""
     control, filter_time_s = design.controller, design.command.filter_time_s
     period_s = control.period_of(control.outermost)
     if 0.0 < filter_time_s <= period_s / pi:
@@ -117,7 +114,6 @@ def _command(design: Design) -> Iterator[Refusal]:
 
 
 def _of(design: Design, path: str) -> Any:
-    """The value of a key of a table that is always there."""
     return getattr(part_at(design, FIELDS[path].section), FIELDS[path].attribute)
 
 
@@ -198,7 +194,6 @@ def _own_inputs(design: Design, stage: str, law: Law) -> Iterator[Refusal]:
 
 
 def _replaced(design: Design, stage: str) -> Iterator[Refusal]:
-    """Keys of the stage that its law takes the place of."""
     part = getattr(design.controller, stage)
     for field in fields_in(f"control.{stage}"):
         value = getattr(part, field.attribute)
@@ -210,7 +205,6 @@ def _replaced(design: Design, stage: str) -> Iterator[Refusal]:
 
 
 def _matrices(law: Law, path: str) -> Iterator[Refusal]:
-    """Shapes of a law's matrices, and that they give anything at all."""
     if law.continuous is not None and not (law.A or law.B or law.C or law.D):
         yield f"{path}.D", "", _RUNS
         return

@@ -69,7 +69,6 @@ def check_motor(design: Design) -> Iterator[Refusal]:
 
 
 def _constants(design: Design) -> tuple[Any, Any]:
-    """The model's kM and kE, which are one number."""
     same = design.effective_motor
     return same.torque_constant_Nm_A, same.back_emf_constant_Vs_rad
 
@@ -79,7 +78,6 @@ def _apart(kM: Any, kE: Any) -> Any:
 
 
 def _warm(design: Design, ratio: Any) -> str:
-    """The other cause of a kM below kE, and what follows from either."""
     if not 0.8 <= ratio <= 0.95:
         return ""
     key = "torque_constant"
@@ -109,11 +107,7 @@ def _ratio(design: Design, off: Any) -> str:
 
 
 def with_stand_ins(design: Design) -> Design:
-    """The design past what `check_motor` refuses, for the other checks.
-
-    A constant that is missing is unread; kE is as kM has it, under the motor.constants with which both agree,
-    where there are such.
-    """
+    """The design past what `check_motor` refuses: kE as kM has it, under constants by which both agree."""
     motor, given = design.motor, {name: getattr(design.motor, name) for name in _ELECTRICAL.values()}
     if motor.source_gain_Nm_V is not None:
         return design if all(value is None for value in given.values()) else replace(design, motor=UNREAD)
@@ -151,7 +145,6 @@ def _number_written(design: Design, key: str) -> tuple[float, str]:
 
 
 def _without(key: str, design: Design) -> str:
-    """What to write where the sheet does not have it."""
     if key == "inductance":
         small = "0.1 to 1 ms of a small motor"
         return f"; where the sheet has none, R times the electrical time constant, {small}"
@@ -177,7 +170,6 @@ def as_one_constant(key: str, design: Design) -> str:
 
 
 def check_temperature(design: Design) -> Iterator[Refusal]:
-    """What heat leaves of R, kM and kE."""
     if (heat := design.temperature) is not None:
         yield from readable(_hot(heat, "winding", "resistance_per_K"))
         yield from readable(_hot(heat, "magnet", "magnet_per_K"))
@@ -190,7 +182,7 @@ def _hot(heat: Any, key: str, per_K: str) -> Iterator[Refusal]:
 
 
 def check_place(design: Design) -> Iterator[Refusal]:
-    """Refuse names of gears that are none; whatever asks for an inertia needs the coupling's place."""
+    """Names of gears that are none; whatever asks for an inertia needs the coupling's place."""
     for path, attribute in (("coupling", "after"), ("load", "locking_gear")):
         yield from readable(_no_gear(design, path, attribute))
 
@@ -227,7 +219,6 @@ def _locking(design: Design) -> Iterator[Refusal]:
 
 
 def _bends(design: Design) -> Iterator[Refusal]:
-    """Torques and stiffnesses of a spring that bends: each with its other, in order."""
     coupling = design.coupling
     if coupling is None:
         return

@@ -231,10 +231,7 @@ class Command:
         example="8000 deg/s^3")] = inf
 
     def lowpass(self, period_s: Any, where: str = "") -> Filter:
-        """The filter, w0 = 1/`filter_time_s`, for the period of the outermost stage in s.
-
-        An InputError for a time constant of T/pi or less: w0 has to lie below pi/T.
-        """
+        """The filter, w0 = 1/`filter_time_s` below pi/T, for the period T of the outermost stage in s."""
         w0 = 1.0 / self.filter_time_s
         if np.any(w0 * np.asarray(period_s) >= pi):
             message = f"command.filter_time = {np.min(self.filter_time_s):g} s"
@@ -281,7 +278,7 @@ class Controller:
         return self.position
 
     def period_of(self, stage: str) -> Any:
-        """Time between two updates of a stage, s: that of a tick where it says no other."""
+        """Time between two updates of a stage, s."""
         return self.period_s * getattr(getattr(self, stage, None), "every", 1)
 
     @property

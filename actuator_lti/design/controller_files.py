@@ -24,7 +24,7 @@ import re
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
-from functools import partial
+from functools import partial, reduce
 from math import inf, isfinite, nan, pi, sqrt
 from operator import mul
 from pathlib import Path
@@ -89,23 +89,14 @@ class Format:
 
 
 def _ratio(above: float, below: float) -> float:
-    """A time, say: infinite where there is no integral part, no number where there is no gain either."""
     return above / below if below else above * inf
 
 
 def _flat(tree: Any, prefix: str = "") -> Tree:
-    """Leaves of a tree by dotted name."""
     result: Tree = {}
     for key, value in tree.items():
         result |= _flat(value, f"{prefix}{key}.") if isinstance(value, dict) else {f"{prefix}{key}": value}
     return result
-
-
-def _older(name: str, found: Format) -> str:
-    """The name that the settings of a format have for one of its file."""
-    for newer, older in found.newer.items():
-        name = name.replace(newer, older)
-    return name
 
 
 def _canopen(text: str, where: str) -> Tree:
@@ -127,7 +118,6 @@ def _whole(value: str) -> Any:
 
 
 def _sketch(text: str, where: str) -> Tree:
-    """What the lines of a sketch set, and how they make their one motor."""
     text = _COMMENT.sub("", text)
     built, assigned = dict(_BUILT.findall(text)), _ASSIGNED.findall(text)
     motors = sorted({*built, *(owner for owner, name, _ in assigned if "." in name)})
@@ -261,17 +251,17 @@ FORMATS = (
 
 
 def import_controller_file(path: Path, base: Design) -> Imported | None:
-    """A design with the settings of such a file; None where it is of none of these formats.
-
-    An InputError where the file cannot be read, or the design cannot hold what stands in it.
-    """
+    """A design with the settings of such a file; None where it is of none of these formats."""
     where, text = shown_path(path), read_text(path, "settings file")
     found = next((one for one in FORMATS if one.known.search(text)), None)
     if found is None:
         return None
     with in_file(where):
         raw = found.read(text, where)
-        spelled = {_older(name, found): name for name in raw}
+        spelled: dict[str, str] = {}  # by the names that the settings of the format have
+        for name in raw:
+            older = reduce(lambda known, each: known.replace(*each), found.newer.items(), name)
+            spelled[older] = name
         given = {older: raw[name] for older, name in spelled.items()}
         if unfit := found.unfit(given, base):
             raise InputError(unfit)
@@ -322,7 +312,6 @@ def _brought(message: str, base: Design, changes: Mapping[str, Any]) -> str:
 
 
 def _says(design: Design, key: str) -> bool:
-    """Whether a design's file has a key, or a list of tables."""
     return any(f"{path}.".startswith(f"{key}.") for path in design.parameters)
 
 
@@ -359,7 +348,8 @@ def _overrides(
             for name, number in numbers.items()
             if number != inf or name in given
         )
-        if value == _none(item.key):
+        known = FIELDS[item.key]  # whose default, of a limit or of a time, says that there is none
+        if value == (nan if known.required else inf if known.default is None else known.default):
             overrides[item.key] = None
             notes += [f"{stated}: none, {item.key} is left out"] if _says(base, item.key) else []
         elif value > 0.0 and isfinite(value):
@@ -369,13 +359,6 @@ def _overrides(
         else:
             notes.append(f"{stated}: not taken, {item.key} stays as it is")
     return overrides, used, notes
-
-
-def _none(key: str) -> float:
-    """The value of a limit or of a time that says that there is none; no number for what has to be there."""
-    known = FIELDS[key]
-    unsaid: float = inf if known.default is None else known.default
-    return nan if known.required else unsaid
 
 
 def _number(raw: object) -> float | None:

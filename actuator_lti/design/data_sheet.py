@@ -1,7 +1,4 @@
-"""What data sheets state in place of friction: no-load current and efficiencies (model.md section 11).
-
-Read into the keys of ``[friction]`` that follow from them, which is what a design has from there on.
-"""
+"""What data sheets state in place of friction (model.md section 11), read into the keys that follow."""
 
 import re
 from collections.abc import Collection, Iterable, Iterator
@@ -61,10 +58,7 @@ def stated_in(design: model.Design) -> Iterator[tuple[str, str, str]]:
 
 
 def as_stated(tree: Tree, changed: Collection[str]) -> None:
-    """Put a sheet's own keys back in place of the friction read from them, unless that is changed itself.
-
-    So that it is read again from what is changed besides: a ratio, the load's path, the torque constant.
-    """
+    """Put a sheet's own keys back for the friction read from them, unless changed: it is read again."""
     friction, pairs = tree.get("friction", {}), tree.get("correlation", [])
     tables = {"motor": tree.get("motor"), **{f"gear.{gear['name']}": gear for gear in tree.get("gear", ())}}
     for keys in _TAKEN.values():
@@ -82,10 +76,7 @@ def as_stated(tree: Tree, changed: Collection[str]) -> None:
 
 
 def _words(entry: Any, tables: Collection[str]) -> list[tuple[re.Match[str], str]] | None:
-    """A sheet's own keys that a value of friction was read from, each with its source.
-
-    None where the value or its tolerance is not as it was read: words of a user.
-    """
+    """The sheet's keys and sources that a value of friction was read from; None of a user's words."""
     if not isinstance(entry, dict) or not entry.get("source", "").startswith(FROM):
         return None
     said, _, source = entry["source"].removeprefix(FROM).partition("; ")
@@ -103,7 +94,6 @@ class DataSheet:
         self.gears = {path: item for path, item in stated.items() if path.startswith(("gear.", "gear["))}
 
     def refusals(self, design: model.Design) -> Iterator[Refusal]:
-        """What stands beside what it takes the place of, and what lacks its other half."""
         for path, item in self.stated.items():
             yield from readable(self._beside(path, item, design))
         yield from readable(self._halved())

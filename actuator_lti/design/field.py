@@ -54,12 +54,9 @@ class Field:
     kind: Kind
     description: str
     attribute: str = ""
-    # An SI unit in which {angle}, {torque} and {inertia} stand for rad, N*m, kg*m^2 on a rotary axis and
-    # m, N, kg on a linear one, {drive} for A or V
-    unit_template: str = ""
+    unit_template: str = ""  # in SI, of {angle}, {torque}, {inertia} as the axis is, and {drive}, A or V
     symbol: str = ""
-    # Inclusive, in SI
-    low: float = -inf
+    low: float = -inf  # inclusive, in SI
     high: float = inf
     choices: tuple[str, ...] = ()
     required: bool = False
@@ -69,7 +66,6 @@ class Field:
 
     @property
     def is_number(self) -> bool:
-        """Whether it holds one number, which may be changed by its dotted path."""
         return self.kind in ("quantity", "integer")
 
     @property

@@ -1,7 +1,4 @@
-"""The one registry of a design file: each table, which part of a `Design` it becomes, and its keys.
-
-Reading, writing, access by dotted key, the schema and the hash are loops over it.
-"""
+"""The one registry of a design file, over which all loop: tables, which part each becomes, its keys."""
 
 from collections.abc import Iterator
 from dataclasses import MISSING, dataclass, fields, replace
@@ -22,11 +19,9 @@ class Section:
     place: str  # where the part lies in a `Design`, such as "controller.velocity"
     kind: type  # dataclass of the part
     required: bool = False  # whether a file must have it
-    # Of repeated tables: known by their key `name` (gears), by their number from 1, or by `label`
-    many: Many = ""
+    many: Many = ""  # repeated tables: known by their key `name`, by their number from 1, or by `label`
     rare: bool = False  # whether lists of values pass over it while all its values are the defaults
-    # Whether it says what is asked of the drive, not what it is: the hash knows it where it stands
-    asked: bool = False
+    asked: bool = False  # of the drive, which it is not: the hash knows it where it stands
     label: str = ""  # the key that a listed table is known by; its number from 1 where empty
 
     @property
@@ -36,7 +31,6 @@ class Section:
 
     @property
     def parent(self) -> str:
-        """The table that this one lies in; empty at the top."""
         return self.path.rpartition(".")[0]
 
     @property
@@ -152,7 +146,6 @@ def part_at(design: model.Design, path: str) -> Any:
 
 
 def with_part(design: model.Design, path: str, part: Any) -> model.Design:
-    """A copy of a design in which the part at a table's dotted path is another."""
     section = BY_PATH.get(path)
     if section is None:
         section = BY_PATH[path.rpartition(".")[0]]
@@ -179,7 +172,6 @@ def _declared(kind: type, template: str) -> Iterator[Field]:
 
 
 def _words(kind: Any) -> tuple[str, ...]:
-    """Those of a Literal, which may be optional or repeated."""
     parts = get_args(kind)
     return parts if all(isinstance(part, str) for part in parts) else get_args(parts[0])
 
@@ -187,10 +179,7 @@ def _words(kind: Any) -> tuple[str, ...]:
 _IN = {one.template: tuple(_declared(one.kind, one.template)) for one in (HEAD, *TABLES)}
 
 FIELDS: dict[str, Field] = {field.path: field for one in (HEAD, *SECTIONS) for field in _IN[one.template]}
-"""Every key by its dotted path, in the order of a design file, without those of the lists at its end.
-
-Repeated tables stand under ``*`` (``gear.*``).
-"""
+"""Every key by its dotted path (``gear.*.ratio``), in a file's order, without the lists at its end."""
 
 
 def field_of(path: str) -> Field | None:
@@ -199,7 +188,6 @@ def field_of(path: str) -> Field | None:
 
 
 def axis_unit(axis: Axis, path: str) -> str:
-    """The SI unit of a key for which the axis alone counts."""
     return FIELDS[path].unit(Structure(axis))
 
 

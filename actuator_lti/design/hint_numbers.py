@@ -29,10 +29,7 @@ _PER_COUNT = re.compile(rf"\s*(?:/|\bper\b)\s*{_COUNT.pattern}\s*\Z")
 
 
 def with_numbers(word: str, path: str, key: str, table: Tree, tree: Tree, frame: Frame, takes: Takes) -> str:
-    """The words of a hint with the numbers of the file: of the key's own table and of the whole ``tree``.
-
-    ``takes`` tells whether a key reads a text as it stands.
-    """
+    """The words of a hint with numbers of the file; ``takes``: whether a key reads a text as it stands."""
     if path == "motor" and _ROOT_OF_WATTS.search(f"{_plain(table[key])}"):
         return _motor_constant(_plain(table[key]), tree, frame)
     if word.startswith("counts_per_rev") and ", which takes" not in word:
@@ -111,7 +108,6 @@ def _over_step(text: Any, section: str, frame: Frame) -> str:
 
 
 def _lines(value: Any, word: str, takes: Takes) -> str:
-    """A number of lines or counts, as a file says which."""
     number = re.match(r"\s*[0-9]+", f"{value}")
     if "some makers" not in word or number is None:
         return ""
@@ -141,7 +137,6 @@ def _of(tree: Tree, table: str, key: str) -> Any:
 
 
 def _si(text: Any, unit: str) -> float:
-    """NaN where it is no such quantity, or none at all."""
     with suppress(InputError):
         return parse_quantity(text, unit) or float("nan") if isinstance(text, str) else float("nan")
     return float("nan")
@@ -153,7 +148,6 @@ def _period_s(text: Any) -> float:
 
 
 def _with_unit(value: Any) -> str:
-    """A value that is a text with a unit, else nothing."""
     with suppress(ValueError):
         return value if isinstance(value := _plain(value), str) and split_quantity(value)[1] else ""
     return ""

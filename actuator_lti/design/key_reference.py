@@ -49,7 +49,9 @@ def _entry(field: Field, structure: Structure) -> KeyEntry:
     unit = "of its quantity" if field.kind == "limit" else field.unit(structure)
     same: Tree = {item.name: getattr(field, item.name, None) for item in fields(KeyEntry)}
     default = "" if field.required or field.section == "design" else _default(field, unit)
-    return KeyEntry(**{**same, "unit": unit, "default": default, "allowed": _allowed(field, unit)})
+    above = "above 0" if field.low > 0 else "0 or more" if field.low == 0 else ""
+    words = "" if field.kind in ("text", "label") else above if field.high == BIG else field.allowed(unit)
+    return KeyEntry(**{**same, "unit": unit, "default": default, "allowed": words})
 
 
 def _default(field: Field, unit: str) -> str:
@@ -64,13 +66,6 @@ def _default(field: Field, unit: str) -> str:
     return text if unit == "1" or value == 0 else f"{text} {unit}"
 
 
-def _allowed(field: Field, unit: str) -> str:
-    numbers = field.kind in ("quantity", "quantities", "matrix")
-    if field.kind in ("text", "label") or (numbers and (field.low, field.high) == (-BIG, BIG)):
-        return ""
-    return field.allowed(unit) if field.high != BIG else "above 0" if field.low > 0 else "0 or more"
-
-
 @dataclass(frozen=True)
 class Explained:
     """One number of a file, by its dotted key."""
@@ -78,8 +73,7 @@ class Explained:
     path: Annotated[str, "Key"]
     written: Annotated[str, "Written"]  # as the file has it
     read: Annotated[str, "Read as"]  # in SI
-    # As the equations have it: symbol and value, of the equivalent DC motor at its temperature
-    model: Annotated[str, "In the model as"]
+    model: Annotated[str, "In the model as"]  # symbol and value, of the equivalent DC motor
 
 
 def explained(design: Design) -> tuple[Explained, ...]:

@@ -115,7 +115,6 @@ class Law(StateSpace):
 
     @property
     def integrates(self) -> bool:
-        """Whether it has a pole at z = 1."""
         if not self.A:
             return False
         A, B, C, _, _ = self.sampled
@@ -124,7 +123,6 @@ class Law(StateSpace):
 
     @property
     def direct(self) -> float:
-        """What a command of one gives at once."""
         return self._gain_on("command", self.sampled.D)
 
     def steady(self, name: str) -> float:
@@ -135,6 +133,5 @@ class Law(StateSpace):
         return self._gain_on(name, D + C @ np.linalg.solve(np.eye(len(A)) - A, B))
 
     def _gain_on(self, name: str, gains: np.ndarray) -> float:
-        """Of the gains on all inputs what a signal gets."""
         reached = ("command", "error") if name == "command" else (name,)
         return self.gain * sum(float(gains[k]) for k, one in enumerate(self.inputs) if one in reached)

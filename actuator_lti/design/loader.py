@@ -62,10 +62,7 @@ def _name_of(given: object) -> str:
 
 
 def design_text(name_or_path: str | PathLike[str]) -> str:
-    """The text of a design file, by shipped name or path, with its comments.
-
-    An InputError if there is no such design, or the file is too large or not UTF-8.
-    """
+    """The text of a design file, by shipped name or path, with its comments; no file is an InputError."""
     name = _name_of(name_or_path)
     if name in shipped_designs():
         return (SHIPPED / f"{name}.toml").read_text(encoding="utf-8")
@@ -97,10 +94,9 @@ def read_design_text(text: str, origin: str = "design", folder: Path | str = "")
 
 def design_from_tree(tree: Tree, origin: str, findings: Findings | None = None) -> Design:
     """Build and check a design from a parsed TOML tree; refused with all that is found wrong in it."""
-    findings = Findings(origin) if findings is None else findings
+    findings = findings or Findings(origin)
     design = read_tree(tree, origin, findings)
-    findings.extend(contradictions(design))
-    findings.refuse()
+    findings.refuse(contradictions(design))
     return design
 
 

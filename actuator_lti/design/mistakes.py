@@ -1,7 +1,4 @@
-"""All mistakes of a design file at once, each with the line of its key.
-
-What could not be read is `UNREAD`, so that what does not need it is checked all the same.
-"""
+"""All mistakes of a design file at once, each with its line; past what is `UNREAD` all is checked."""
 
 from __future__ import annotations
 
@@ -48,10 +45,7 @@ class UnreadError(Exception):
 
 
 class _Unread:
-    """A number, word, list or table of which nothing is known but that it is there (it is not None).
-
-    Sums and products with it are unread too; who decides by it, shows it or asks for its parts, stops.
-    """
+    """There, but not known: sums and products with it are unread too; who decides by it or shows it stops."""
 
     def _passed_on(self, *_: object) -> _Unread:
         return self
@@ -88,8 +82,7 @@ class Rule:
     """What a design must not be: the key that is refused then, its value as shown, and what is allowed."""
 
     key: str
-    # Both show values of the design ``d``, as ``{d.limits.voltage_V:g}``
-    given: str
+    given: str  # shows values of the design ``d``, as ``{d.limits.voltage_V:g}``; so does what is allowed
     allowed: str
     broken: Callable[[Design], Any]
 
@@ -99,10 +92,7 @@ class Rule:
 
 
 class Findings:
-    """What is wrong in one file; ``lines`` gives the line of a dotted key, where there is a text.
-
-    ``folder`` is that of the file: what it names lies there.
-    """
+    """What is wrong in one file: its lines by dotted key, and the folder in which what it names lies."""
 
     def __init__(self, where: str, lines: Mapping[str, int] | None = None, folder: Path = Path()) -> None:
         self.where, self.folder = where, folder
@@ -116,15 +106,16 @@ class Findings:
         self.found.append((line, InputError(text, where=self.where)))
 
     def alias(self, path: str, written: str) -> None:
-        """A key stands in the file under another name: its mistakes are in that line."""
+        """A key stands under another name: its mistakes are in that line."""
         self.lines[path] = self._line(written)
 
     def extend(self, refusals: Iterable[Refusal]) -> None:
         for refusal in refusals:
             self.note(*refusal)
 
-    def refuse(self) -> None:
-        """Refuse the file if anything was found: an InputError, or all in its order (`Mistakes`)."""
+    def refuse(self, refusals: Iterable[Refusal] = ()) -> None:
+        """Refuse the file if there is any, or something was found before: all in its order."""
+        self.extend(refusals)
         errors = [error for _, error in sorted(self.found, key=lambda item: item[0])]
         if len(errors) > MOST:
             errors[MOST:] = [InputError(f"and {len(errors) - MOST} more mistakes", where=self.where)]
@@ -138,7 +129,6 @@ class Findings:
 
 
 def meant_of(word: str, known: Iterable[str]) -> str:
-    """The known word that is nearest to one, or nothing where none is near."""
     return next(iter(get_close_matches(word, list(known), 1, 0.65)), "")
 
 
@@ -177,7 +167,6 @@ def lines_of(text: str, tree: Tree) -> dict[str, int]:
 
 
 def _names(dotted: str) -> tuple[str, ...]:
-    """The parts of a dotted key, without quotes."""
     return tuple(name[1:-1] if name[0] in "\"'" else name for name in _PARTS.findall(dotted))
 
 

@@ -1,8 +1,4 @@
-"""Settings of the motion controller: from its own objects to a design and back, without loss.
-
-Its objects are those of the Faulhaber MC V3.0 family. Grades as in a design file: A the maker's documents,
-B a file of a real device, D derived, X assumed.
-"""
+"""Settings of the motion controller (Faulhaber MC V3.0), to a design and back, without loss."""
 
 from dataclasses import dataclass, replace
 from math import inf, isfinite, pi
@@ -10,7 +6,8 @@ from typing import Any
 
 from actuator_lti.design.access import parameter_value, with_values
 from actuator_lti.design.asked import ControllerObject, ControllerObjects, FrozenMap, ObjectPlace
-from actuator_lti.design.checks import check_relations
+from actuator_lti.design.checks import contradictions
+from actuator_lti.design.mistakes import Findings
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError, in_file
 from actuator_lti.files.reading import shown
@@ -85,7 +82,7 @@ def step_of(known: KnownObject, velocity_gain_factor: float) -> float:
 
 
 def model_value(design: Design, known: KnownObject) -> float | None:
-    """What the design says for an object, in SI; None if nothing."""
+    """In SI; None if the design says nothing."""
     if known.place == (0x2329, 10):  # all inertia but the rotor's
         return design.inertia_kgm2 - design.motor.rotor_inertia_kgm2
     paths = known.paths if known.alias_of is None else OBJECTS[known.alias_of].paths
@@ -157,7 +154,7 @@ def import_objects(objects: ControllerObjects, base: Design, where: str = "setti
     source, old = f"controller settings {where}", design.parameters
     named = {path: replace(old[path], source=source, grade="B") for path in changes}
     design = replace(design, objects=objects, parameters=FrozenMap({**old, **named}))
-    check_relations(design, where)
+    Findings(where).refuse(contradictions(design))
     notes = _import_notes(given, objects.velocity_gain_factor, design)
     return Imported(design=design, changed=tuple(changes), kept=tuple(kept), notes=notes)
 
@@ -228,11 +225,7 @@ def _import_notes(given: _Values, factor: float, design: Design) -> tuple[str, .
 
 
 def export_objects(design: Design, *, complete: bool | None = None) -> Exported:
-    """A controller's settings from a rotary drive with all three loops, unknown objects as they were.
-
-    ``complete`` adds those that the imported settings did not have; by default only a design that was never
-    imported gets them. A value that does not fit its object's range is an InputError.
-    """
+    """Settings of a drive with all loops; ``complete`` adds those that the imported ones did not have."""
     _check_cascade(design)
     before = design.objects
     complete = not before.values if complete is None else complete
@@ -257,7 +250,6 @@ def export_objects(design: Design, *, complete: bool | None = None) -> Exported:
 
 
 def _encode(design: Design, known: KnownObject, rounded: list[Rounding]) -> int | None:
-    """The integer of an object for this design; None where the design says nothing."""
     value = model_value(design, known)
     path = known.paths[0] if known.paths else known.meaning
     allowed = f"{known.low} to {known.high} {known.unit}"

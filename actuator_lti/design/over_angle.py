@@ -52,10 +52,7 @@ class OverAngle:
         return torque
 
     def slope_at(self, angle_rad: Any, *, moving: bool = False) -> Any:
-        """Its slope at an angle; 0 where that is no more than rounding leaves of it, as at a quarter turn.
-
-        ``moving``: of a drive in motion, to which waves that average have none.
-        """
+        """0 where rounding leaves no more, as at a quarter turn; ``moving``: waves that average have none."""
         acting = self._acting(moving)
         slope, size = self.slope_Nm_rad, abs(self.slope_Nm_rad)
         for wave in acting:

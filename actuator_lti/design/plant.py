@@ -60,17 +60,12 @@ class Motor:
 
     @property
     def over_angle(self) -> OverAngle:
-        """What of its torque depends on its angle."""
         cogging = Wave(self.cogging_Nm, self.cogging_periods, self.cogging_phase_rad, averages=True)
         return OverAngle(waves=(cogging,))
 
     def straight(self) -> "Motor":
         """The same without what bends with the angle."""
         return replace(self, cogging_Nm=0.0)
-
-    def level(self) -> "Motor":
-        """The same without what depends on the angle."""
-        return self.straight()
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -160,7 +155,6 @@ class Coupling:
         return self.stretch_rad(torque_Nm) + side * self.play_rad
 
     def stiffness_at(self, twist_rad: Any) -> Any:
-        """Stiffness of the piece that holds at a twist."""
         result: Any = self.stiffness_Nm_rad
         for _, twist, k in self.pieces[1:]:
             result = where(abs(twist_rad) - 0.5 * self.play_rad > twist, k, result)
@@ -279,7 +273,6 @@ class Load:
 
     @property
     def over_angle(self) -> OverAngle:
-        """What of its own torque depends on the output angle."""
         gear = Wave(self.gear_error_Nm, self.gear_error_periods, self.gear_error_phase_rad, averages=True)
         pendulum = () if self.gravity is None else (Wave(self.gravity.peak_Nm, 1.0, self.gravity.offset_rad),)
         return OverAngle(self.moment_slope_Nm_rad, (gear, *pendulum))
@@ -293,7 +286,6 @@ class Load:
         return replace(self.straight(), moment_slope_Nm_rad=0.0)
 
     def acting(self) -> tuple[str, ...]:
-        """The keys of the moments that act by themselves."""
         there = {
             "load.moment_slope": np.any(self.moment_slope_Nm_rad),
             "load.moment_damping": np.any(self.moment_damping_Nms_rad),

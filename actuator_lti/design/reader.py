@@ -1,7 +1,4 @@
-"""From the tree of a design file to a :class:`Design` in SI units: one walk over the declared keys.
-
-A mistake is noted and the walk goes on, past what is `UNREAD` then, so that all are told at once.
-"""
+"""From the tree of a design file to a `Design` in SI: one walk over the declared keys, past mistakes."""
 
 import re
 from collections.abc import Callable, Collection, Iterable
@@ -116,7 +113,6 @@ class Reader:
         return self.unread(path, reason, shown(value))
 
     def unread(self, path: str, reason: str, value: str = "") -> Any:
-        """The same of a key without a value to show."""
         self.findings.note(path, value, reason)
         return UNREAD
 
@@ -188,7 +184,6 @@ class Reader:
         return values, meant
 
     def value(self, field: Field, table: Tree, path: str) -> Any:
-        """One value as the design has it."""
         raw = table[field.key]
         if raw is UNREAD:
             return UNREAD
@@ -327,7 +322,6 @@ class Reader:
         return int(value) if field.kind == "integer" else value
 
     def limit(self, quantity: Any, raw: Any, path: str) -> Any:
-        """A limit in the unit in which its quantity is reported."""
         near = get_close_matches(f"{quantity}", QUANTITIES, 1, _VERY_NEAR)
         known = QUANTITIES[near[0]] if near else None
         if isinstance(raw, bool) or not isinstance(raw, str | int | float):
@@ -423,7 +417,6 @@ class Reader:
         return numbered
 
     def objects(self, raw: Any) -> model.ControllerObjects:
-        """The settings that the design was imported from."""
         try:
             return objects_from({} if raw is None else raw)
         except InputError as error:
@@ -448,7 +441,6 @@ def _rows_flat(raw: Any) -> Any:
 
 
 def _fits(field: Field, raw: Any) -> bool:
-    """Whether a value that is no number is what its key takes."""
     if field.kind == "flag" or not isinstance(raw, str):
         return field.kind == "flag" and isinstance(raw, bool)
     if field.kind == "day":

@@ -46,7 +46,6 @@ def parse_settings(text: str, where: str, velocity_gain_factor: float | None = N
 
 
 def parse_label(label: str) -> tuple[int, int]:
-    """Index and subindex of ``"0x2344.01"`` or ``"0x6080"``."""
     match = _LABEL.match(label)
     if match is None:
         raise InputError(f'{shown(label)}: allowed: an object such as "0x2344.01" or "0x6080"')
@@ -72,10 +71,7 @@ def object_entry(item: ControllerObject) -> Any:
 
 
 def objects_from(raw: Any, factor: float | None = None, values: str = "values") -> ControllerObjects:
-    """Settings as a table: the calibration of the velocity gain, the family, and the objects.
-
-    ``values`` is the key of the objects: in ``[objects]`` of a design file ``"values"``.
-    """
+    """Settings as a table: calibration of the velocity gain, family, and the objects (key ``values``)."""
     known = ("velocity_gain_factor", "family", values)
     table = raw if isinstance(raw, dict) else {"": raw}
     for key in table:
@@ -93,7 +89,6 @@ def objects_from(raw: Any, factor: float | None = None, values: str = "values") 
 
 
 def write_settings_toml(objects: ControllerObjects) -> str:
-    """Settings as TOML, each known object with its meaning and unit beside it."""
     lines = [
         "# Settings of the motion controller, in the units of its own objects.",
         f"velocity_gain_factor = {objects.velocity_gain_factor!r}  # 1: 0x2344.01 per rad/s; 9.549: per rpm",
@@ -139,7 +134,6 @@ def placed(element: Element, depth: int = 0) -> Iterator[tuple[ObjectPlace, Elem
 
 
 def _objects_in(root: Element) -> Iterator[tuple[ControllerObject, Element]]:
-    """Every object with an actual value, and the element that holds it."""
     for place, one in placed(root):
         if (given := one.get("actualValue")) is None:
             continue
@@ -190,10 +184,7 @@ def settings_xml(objects: ControllerObjects, into: Path | None = None) -> tuple[
 
 
 def update_settings_xml(text: str, objects: ControllerObjects) -> tuple[str, tuple[str, ...]]:
-    """Put settings into the device configuration that they came from, which keeps all but its comments.
-
-    Gives the new text, and the labels of objects that it has no place for.
-    """
+    """The device configuration with other settings, without comments; labels that have no place there."""
     for prefix, uri in re.findall(r'xmlns(?::([A-Za-z][\w.-]*))?\s*=\s*"([^"]*)"', text):
         if not re.fullmatch(r"ns[0-9]+", prefix):
             register_namespace(prefix, uri)

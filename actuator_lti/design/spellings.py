@@ -85,19 +85,15 @@ def _alone(text: str) -> str:
     for aside, find in ((_BOUND, _BOUND.match), (_AT, _AT.search), (_SPREAD, _SPREAD.search)):
         if found := find(text):
             plain = f"{text[: found.start()]}{text[found.end() :]}".strip()
-            two = _TWO.fullmatch(text)  # a number, its tolerance, and the unit of both
-            plain, width = (f"{two[1]} {two[3]}", _percent(two)) if two else (plain, "")
             keys = "temperature.reference" if aside is _AT else "tolerance"
-            raise ValueError(f"write {shown(plain)}; {shown(found[1])} is one for {keys}{width} or source")
+            if two := _TWO.fullmatch(text):  # a number, its tolerance, and the unit of both
+                plain, value = f"{two[1]} {two[3]}", float(two[1])
+                keys += f' = "{100.0 * float(two[2]) / value:.4g} %"' if value else ""
+            raise ValueError(f"write {shown(plain)}; {shown(found[1])} is one for {keys} or source")
     text = _TEN.sub(lambda found: f"10^{found[1].translate(_RAISED)}", text)
     for column, product in _COLUMN:
         text = column.sub(product, text)
     return text
-
-
-def _percent(two: re.Match[str]) -> str:
-    value = float(two[1])
-    return f' = "{100.0 * float(two[2]) / value:.4g} %"' if value else ""
 
 
 def split_quantity(text: str) -> tuple[float, str]:

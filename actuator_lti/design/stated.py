@@ -41,7 +41,6 @@ class Frame:
 
     @property
     def motor_axis(self) -> Axis:
-        """The kind of axis of the motor's own values: rotary before a screw."""
         return self.structure.axis if self.travel_m_rad is None else "rotary"
 
     def per_metre(self, section: str) -> bool:
@@ -135,7 +134,6 @@ class Frame:
         return volts * float((DC_PER_A[given] / (DC_PER_A[self.constants] if own else 1.0)) ** power)
 
     def other_axis(self, raw: Any, field: Field) -> str:
-        """That the unit of a refused value would be one of the other kind of axis."""
         other = replace(self.structure, axis="linear" if self.structure.axis == "rotary" else "rotary")
         unit = field.unit(other)
         try:
@@ -146,7 +144,6 @@ class Frame:
 
 
 def _refuse_mains(text: str) -> None:
-    """A supply in volts of the mains: the bus is direct."""
     *low, high = _RANGE.split(text)  # 100-120 V
     each = [f"{number} {split_quantity(high)[1]}" for number in low] + [high]
     volts = " to ".join(f"{sqrt(2.0) * parse_quantity(one, 'V'):.4g} V" for one in each)

@@ -27,14 +27,13 @@ def warnings_of(design: Design) -> tuple[str, ...]:
     """
     design = as_design(design)
     checks = (
-        _sampling, _crossovers, _law, _limits, _unused, _unseen, _gears, _loads, _angles, _asked_for,
-        _pedigree, _encoder, _one_constant, elastic_warnings, kept_gains,
+        _sampling, _crossovers, _limits, _unseen, _loads, _asked_for, _pedigree, _encoder,
+        elastic_warnings, kept_gains,
     )  # fmt: skip
     return tuple(line for check in checks for line in check(design))
 
 
 def _periods(design: Design) -> dict[str, float]:
-    """Period in s of each loop, the inner ones first."""
     return {stage: design.controller.period_of(stage) for stage in reversed(design.controller.stages)}
 
 
@@ -81,15 +80,6 @@ def _crossovers(design: Design) -> Iterator[str]:
         if crossovers.get(outer, 0.0) > crossovers.get(inner, inf):
             above = f"crossover near {crossovers[outer]:.3g} rad/s lies above that of the {inner} loop"
             yield f"control.{outer}.gain: {above} inside it, {crossovers[inner]:.3g} rad/s"
-
-
-def _one_constant(design: Design) -> Iterator[str]:
-    """A back-EMF constant that is taken: nothing beside it tells a wrong convention."""
-    if design.motor.back_emf_constant_Vs_rad is None and (same := as_one_constant(_BACK_EMF, design)):
-        yield f"motor.{_BACK_EMF}: not given; {same}: a wrong motor.constants would not show"
-
-
-def _law(design: Design) -> Iterator[str]:
     own = design.controller.own_law
     if own is not None and (size := max(abs(own[1].poles), default=0.0)) > 1.0 + 1e-9:
         yield f"control.{own[0]}.law: unstable of itself, a pole of size {size:.6g}"
@@ -109,14 +99,10 @@ def _limits(design: Design) -> Iterator[str]:
         volts, kE = design.limits.voltage_V, design.effective_motor.back_emf_constant_Vs_rad
         only = f"U/kE = {volts:.4g} V/({kE:.4g} V/({unit})) = {top:.4g} {unit}{turns}"
         yield f"limits.speed: {speed:.4g} {unit}, but the supply reaches only {only}"
-
-
-def _unused(design: Design) -> Iterator[str]:
-    limits, control = design.limits, design.controller
-    if isfinite(limits.peak_current_A) and control.current is None:
+    if isfinite(peak) and design.controller.current is None:
         yield "limits.peak_current: clamps nothing, the design has no current loop"
-    for key, value in (("speed", limits.speed_rad_s), ("acceleration", limits.acceleration_rad_s2)):
-        if control.velocity is None and isfinite(value):
+    for key, value in (("speed", speed), ("acceleration", design.limits.acceleration_rad_s2)):
+        if design.controller.velocity is None and isfinite(value):
             yield f"limits.{key}: clamps nothing, the design has no velocity loop"
     if design.friction.law == "tanh" and design.friction.breakaway_ratio != 1.0:
         yield "friction.breakaway_ratio: not used by the tanh law"
@@ -138,27 +124,13 @@ def _unseen(design: Design) -> Iterator[str]:
             yield f"{sensor}.counts_per_rev: acts on nothing, {why}"
 
 
-def _angles(design: Design) -> Iterator[str]:
-    """Angles that decide the sign of a stiffness, and are not said."""
-    said = design.parameters
-    if design.motor.cogging_Nm != 0.0 and "motor.cogging_phase" not in said:
-        drives = "at angle 0 cogging drives the motor away; 180 deg: it holds"
-        yield f"motor.cogging_phase: not given, 0 assumed: {drives}"
-    if design.load.gravity is not None and "load.gravity.offset" not in said:
-        drives = "at angle 0 the mass stands upright, and gravity drives it away; 180 deg: it hangs"
-        yield f"load.gravity.offset: not given, 0 assumed: {drives}"
+def _loads(design: Design) -> Iterator[str]:
+    from actuator_lti.drive.facts import stall_torque_Nm
 
-
-def _gears(design: Design) -> Iterator[str]:
     for gear in design.gears if design.total_ratio < 1.0 else ():
         if gear.ratio < 1.0:
             faster = f"{gear.ratio:.4g} turns the output faster than the motor"
             yield f'gear.{gear.name}.ratio: {faster}; a reduction is written "{1.0 / gear.ratio:.6g}:1"'
-
-
-def _loads(design: Design) -> Iterator[str]:
-    from actuator_lti.drive.facts import stall_torque_Nm
-
     largest, given = design.load.moment_max_Nm, stall_torque_Nm(design)
     unit, holding = unit_on(design.axis, "{torque}"), given * design.total_ratio
     losses = design.parameters.get("friction.load_coefficient")
@@ -217,17 +189,21 @@ def elastic_warnings(design: Design) -> Iterator[str]:
 
 
 def _asked_for(design: Design) -> Iterator[str]:
-    """Requirements on what the drive can do, of more than the profile of its command asks for."""
+    """Angles that decide the sign of a stiffness; requirements beyond what the command's profile asks for."""
+    said = design.parameters
+    if design.motor.cogging_Nm != 0.0 and "motor.cogging_phase" not in said:
+        drives = "at angle 0 cogging drives the motor away; 180 deg: it holds"
+        yield f"motor.cogging_phase: not given, 0 assumed: {drives}"
+    if design.load.gravity is not None and "load.gravity.offset" not in said:
+        drives = "at angle 0 the mass stands upright, and gravity drives it away; 180 deg: it hangs"
+        yield f"load.gravity.offset: not given, 0 assumed: {drives}"
     for one in design.requirements:
         if one.minimum is not None and (told := beyond_profile(design, one, one.minimum)):
             yield f"requirement {one.id}: at least {one.minimum:.4g} {one.unit}, but {told}"
 
 
 def beyond_profile(design: Design, requirement: Requirement, value: float) -> str:
-    """What the profile of the command says to a rate or acceleration, in the unit of a requirement on it.
-
-    Empty where a command may ask for as much.
-    """
+    """What the command's profile says to a required rate or acceleration; empty where it asks for as much."""
     command, turned = design.command, 180.0 / pi if design.axis == "rotary" else 1.0
     rate, acceleration = command.rate_rad_s * turned, command.acceleration_rad_s2 * turned
     most = {"output_rate": ("rate", rate), "acceleration": ("acceleration", acceleration)}
@@ -262,10 +238,12 @@ def kept_gains(design: Design) -> Iterator[str]:
 
 
 def _encoder(design: Design) -> Iterator[str]:
+    """Counts that are coarse; a back-EMF constant that is taken: nothing tells a wrong convention."""
     quantum, encoder, top = design.angle_quantum_rad, design.encoder, design.limits.speed_rad_s
-    if encoder.speed != "difference" or quantum is None or design.controller.velocity is None:
-        return
-    step = quantum / (encoder.difference_samples * design.controller.period_of("velocity"))
-    if isfinite(top) and step > 0.05 * top:
-        unit = unit_on(design.axis, "{angle}/s")
-        yield f"encoder.counts_per_rev: one count is {step:.3g} {unit}, more than 5 % of limits.speed"
+    if encoder.speed == "difference" and quantum is not None and design.controller.velocity is not None:
+        step = quantum / (encoder.difference_samples * design.controller.period_of("velocity"))
+        if isfinite(top) and step > 0.05 * top:
+            unit = unit_on(design.axis, "{angle}/s")
+            yield f"encoder.counts_per_rev: one count is {step:.3g} {unit}, more than 5 % of limits.speed"
+    if design.motor.back_emf_constant_Vs_rad is None and (same := as_one_constant(_BACK_EMF, design)):
+        yield f"motor.{_BACK_EMF}: not given; {same}: a wrong motor.constants would not show"

@@ -95,10 +95,7 @@ def tolerances(design: Design) -> tuple[tuple[str, float, Tolerance], ...]:
 
 
 def drawn(design: Design) -> tuple[tuple[str, float, Tolerance], ...]:
-    """Those of `tolerances` that vary on their own.
-
-    Of torque and back-EMF constant the former leads, unless a correlation says how the latter goes.
-    """
+    """Those that vary on their own: kE follows kM unless a correlation says how it goes."""
     every = tolerances(design)
     stated = any(_BACK_EMF in (pair.first, pair.second) for pair in design.correlations)
     led = not stated and any(path == _TORQUE for path, *_ in every)
@@ -106,10 +103,7 @@ def drawn(design: Design) -> tuple[tuple[str, float, Tolerance], ...]:
 
 
 def together(design: Design, values: Mapping[str, Any]) -> dict[str, Any]:
-    """Values (SI, or arrays of them) with the other one of torque and back-EMF constant, by the same factor.
-
-    ``design`` is the nominal one; where both have a value in ``values`` both stay.
-    """
+    """Values, or arrays, with kM or kE besides by the same factor as the other, where it has none."""
     for path, other in ((_TORQUE, _BACK_EMF), (_BACK_EMF, _TORQUE)):
         if path in values and other not in values and {path, other} <= design.parameters.keys():
             now, then = (float(design.parameters[one].value) for one in (path, other))

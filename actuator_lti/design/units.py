@@ -1,8 +1,7 @@
 """Quantities as a data sheet writes them: ``"6 uH"``, ``"9.2 g*cm^2"``, ``"9000 rpm"``.
 
-A unit is a product of powers of names, its factor exact until it is rounded once.  The angle is a dimension
-of its own here, so that ``120 1/s`` (a gain) and ``120 rad/s`` (a speed) are not mistaken for each other;
-where SI lets the radian go (``V*s/rad`` or ``V*s``) it may be left out.
+A product of powers of names, its factor rounded once. The angle is a dimension, so that 120 1/s is no
+120 rad/s; where SI lets the radian go (``V*s/rad`` or ``V*s``) it may be left out.
 """
 
 from __future__ import annotations
@@ -152,7 +151,6 @@ def _units() -> Units:
 
 
 def _named(name: str, units: Units) -> Exact:
-    """A name, with a prefix, in the plural."""
     for one in (name, name.removesuffix("s")):
         plural = one != name
         for prefix, power in (("", 0), *_PREFIXES.items()):
@@ -170,10 +168,7 @@ def _named(name: str, units: Units) -> Exact:
 
 @lru_cache(maxsize=512)
 def parse_unit(unit: str) -> UnitValue:
-    """Read a unit such as ``"N*m/A"``; the empty text and ``"1"`` are dimensionless.
-
-    A ValueError if it is no unit, with the nearest known one where there is one.
-    """
+    """Read a unit such as ``"N*m/A"``; a ValueError if it is none, with the nearest known one."""
     if len(unit) > LONGEST:
         raise ValueError("a unit of more than 120 characters")
     if unit.strip() in ("", "1"):
@@ -232,7 +227,6 @@ def _kinds() -> dict[Dimension, str]:
 
 
 def _kind_of(written: str, value: UnitValue) -> str:
-    """What a unit measures, in words where there is one."""
     kind = _kinds().get(value.dimension)
     if kind is None:
         return f"has the dimension of {shown(written)}"
@@ -267,7 +261,6 @@ class AdvisedError(InputError):
 
 
 def _advice(value: UnitValue, wanted: UnitValue, number: float) -> str:
-    """How to get from what is written to what is wanted."""
     kind = _kinds().get(value.dimension)
     advices = (said for (one, unit), said in _ADVICE.items()
                if one == kind and parse_unit(unit).dimension == wanted.dimension)  # fmt: skip

@@ -60,7 +60,6 @@ def _state_space(system: Any, name: str = "system") -> tuple[Any, Any, Any, Any,
 
 
 def _inputs(system: Any, inputs: Sequence[str] | None) -> list[str]:
-    """The names of the inputs: as given, else the system's own labels."""
     given = getattr(system, "input_labels", None) if inputs is None else inputs
     listed: list[Any] = list(given) if isinstance(given, Sequence) and not isinstance(given, str) else [given]
     for name in listed:

@@ -34,18 +34,12 @@ _WHICH = ("rotor", "to", "locking_gear", "law", "continuous", "speed_rad_s", "cu
 
 
 def write_design(design: Design) -> str:
-    """The design as TOML that :func:`read_design_text` turns back into an equal design.
-
-    Values stay as they were written, with source, grade and tolerance; comments are not kept.
-    """
+    """The design as TOML that :func:`read_design_text` turns back into an equal design, without comments."""
     return tomli_w.dumps(design_tree(as_design(design)))
 
 
 def write_changed(before: Design, after: Design) -> str:
-    """A changed design as TOML: its file's own keys, as a data sheet states them, with what differs.
-
-    Where that does not read as the same design, or the file is gone: as `write_design` has it.
-    """
+    """A changed design as its own file with what differs; written anew where that reads as another design."""
     with suppress(InputError):
         raw = parse_toml(design_text(before.origin), before.origin)
         text = tomli_w.dumps(_changed(raw, design_tree(as_design(before.origin)), design_tree(after)))
@@ -55,7 +49,6 @@ def write_changed(before: Design, after: Design) -> str:
 
 
 def _changed(raw: Tree, old: Tree, new: Tree) -> Tree:
-    """What a file says, with the difference between two designs."""
     made = {key: value for key, value in raw.items() if key in new or key not in old}
     for key, value in new.items():
         was, said = old.get(key), raw.get(key)
@@ -204,10 +197,7 @@ def with_units(design: Design, values: Mapping[str, Any]) -> Tree:
 
 
 def read_value(design: Design, path: str, text: str | float) -> float:
-    """A numeric key's value in SI as the design's file would have it from this text; a bare number is in SI.
-
-    An InputError for an unknown key, a wrong unit, or a value that the key does not allow.
-    """
+    """A key's value in SI as the file would read a text; a bare number is in SI. InputError: not allowed."""
     field, _ = located(design, path)
     with suppress(ValueError):
         text = with_units(design, {path: float(text)})[path]
@@ -281,15 +271,11 @@ def _width_gone(old: Tree, value: Any) -> bool:
 
 
 def _label(item: Tree, number: int) -> str:
-    """What a repeated table is known by: its id, its name, else its number from 1."""
     return str(item.get("id", item.get("name", number)))
 
 
 def design_hash(design: Design) -> str:
-    """SHA-256 (hex) of what a design is: all values in SI to 12 digits, tolerances and requirements.
-
-    It does not depend on comments, order of keys, spelling of units, titles, sources, grades or facts.
-    """
+    """SHA-256 (hex) of all values in SI to 12 digits, tolerances, requirements; not of titles or sources."""
     design = as_design(design)
     parts = [section for section in SECTIONS if not section.parent]
     top = {part.place for part in parts if not part.asked or getattr(design, part.place) is not None}

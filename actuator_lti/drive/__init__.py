@@ -1,4 +1,1 @@
-"""The linear writing of a drive (model.md section 8): plant, blocks, wiring, signals, operating facts.
-
-Everything works for one design, or for many at once: a design whose numbers are arrays of shape (K,).
-"""
+"""The linear writing of a drive (model.md section 8), of one design or of many: numbers or arrays (K,)."""

@@ -1,8 +1,7 @@
 """Controllers, filters and estimators as small linear blocks with a sampled and a continuous realisation.
 
-A realisation is ``x+ = A x + B e`` (sampled) or ``dx/dt = A x + B e`` (continuous) with ``y = C x + D e``.
-Coefficients are floats, or arrays of shape (K,) stacked over designs. What the running tick computes block
-by block stands in model.md sections 2 and 7; here is what it is as a linear system.
+``x+ = A x + B e`` (sampled) or ``dx/dt = A x + B e`` with ``y = C x + D e``; coefficients are floats, or
+arrays of shape (K,) stacked over designs. The running tick stands in model.md sections 2 and 7.
 """
 
 from dataclasses import dataclass
@@ -44,20 +43,13 @@ class Block:
     period_s: Any = 0.0  # T of the sampled realisation
     age_s: Any = 0.0  # delay that the continuous one needs besides (a difference over m T is m T/2 old)
 
-    def at_z(self, omega_rad_s: np.ndarray) -> np.ndarray:
-        """Frequency response of the sampled realisation."""
-        return self.sampled.response(np.exp(1j * np.asarray(omega_rad_s) * self.period_s))
-
     def at_s(self, omega_rad_s: np.ndarray) -> np.ndarray:
         """Frequency response of the continuous realisation, its age left out."""
         return self.continuous.response(1j * np.asarray(omega_rad_s))
 
 
 def pi(gain: Any, integral_time_s: Any, period_s: Any) -> Block:
-    """PI in the drive's own form: ``v = Kp e + I'``, ``I' = I + (Kp T/Tn) e``; P where Tn is ``None``.
-
-    In continuous time Kp (1 + 1/(Tn s)).
-    """
+    """``v = Kp e + I'``, ``I' = I + (Kp T/Tn) e``, continuous Kp (1 + 1/(Tn s)); P where Tn is ``None``."""
     if integral_time_s is None:
         return Block(Realisation(D=gain), Realisation(D=gain), (), period_s)
     rate = gain / integral_time_s
@@ -134,10 +126,7 @@ def centre_rad_s(item: Filter) -> Any:
 
 
 def biquad(item: Filter, period_s: Any) -> Block:
-    """A filter of the velocity loop (model.md section 7), by Tustin's rule prewarped at its own frequency.
-
-    Raises `InputError`: for a frequency at or above pi/T.
-    """
+    """A filter of the velocity loop, Tustin prewarped at its own frequency; an InputError from pi/T on."""
     if item.kind == "biquad":
         return _given(item, period_s)
     num, den = analog(item)

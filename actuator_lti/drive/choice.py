@@ -1,8 +1,4 @@
-"""Choices between values that numbers, arrays of many designs and followed values make alike.
-
-A followed value is one that writes down what is done with it (`nonlinear.export.trace`); a comparison of it
-has a ``either`` of its own.
-"""
+"""Choices between numbers, arrays of many designs and followed values (`nonlinear.export.trace`) alike."""
 
 import math
 from typing import Any

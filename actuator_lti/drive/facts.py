@@ -1,8 +1,7 @@
 """What a drive can do at a load, in closed form: stall, breakaway, torque gain, top speed, acceleration.
 
-Steady motion and the first instant of it. Every function takes one design or a stacked one (numbers that are
-arrays of shape (K,)) and gives floats or arrays. Sources: paper, equations (1), (2), (9); model.md sections
-1, 6.
+Of one design or a stacked one, arrays of shape (K,). Sources: paper, equations (1), (2), (9); model.md
+sections 1, 6.
 """
 
 import math
@@ -11,7 +10,7 @@ from typing import Any
 
 from actuator_lti.design.model import Design
 from actuator_lti.drive.choice import finite, larger, smaller, where
-from actuator_lti.drive.operating import Operating, dry_torque, friction_slopes, stiffness_there
+from actuator_lti.drive.operating import Operating, dry_torque, friction_slopes, stiffness_there, train_gain
 from actuator_lti.drive.steady import circuit_resistance_ohm, droop, winding
 from actuator_lti.drive.wiring import present
 from actuator_lti.errors import InputError
@@ -26,14 +25,10 @@ ROUNDING = 1e-12  # of a speed: nearer than that, two bounds are one
 class Capability:
     """Figures of the whole drive at one load torque, the worse of both directions; floats or arrays."""
 
-    # Largest steady speed of the output within the speed, voltage and peak current limits; 0 if it cannot
-    # move, ``inf`` without any limit
-    output_rate_rad_s: Any
+    output_rate_rad_s: Any  # largest steady speed of the output within the limits, ``inf`` without any
     rate_limit: Any  # what sets it, a place in `RATE_LIMITS`
-    # Needed at that speed; NaN for an ideal source or where the speed has no bound
-    motor_current_A: Any
-    # Largest of the output from rest, within the acceleration limit; 0 if it cannot move
-    acceleration_rad_s2: Any
+    motor_current_A: Any  # needed there; NaN for an ideal source or where the speed has no bound
+    acceleration_rad_s2: Any  # largest of the output from rest, within its limit; 0 if it cannot move
     # Motor torque at rest over what friction and the load ask of it to start, the smaller of both directions;
     # ``inf`` where nothing holds it (ECSS-E-ST-33-01C: motorization factor)
     torque_margin: Any
@@ -51,10 +46,7 @@ def stall_torque_Nm(design: Design) -> Any:
 
 
 def resonance_rad_s(design: Design, load_Nm: float = 0.0) -> Any:
-    """Resonance of motor and load on the coupling, undamped: ``sqrt(k (1/J_l + 1/(J_m N_c^2)))``.
-
-    ``k`` is that of the piece on which the drive stands under a load.
-    """
+    """Undamped, of the spring's piece under a load: ``sqrt(k (1/J_l + 1/(J_m N_c^2)))``."""
     ratio = design.ratio_to_coupling
     inverse = 1.0 / design.load_side_inertia_kgm2 + 1.0 / (design.motor_side_inertia_kgm2 * ratio**2)
     return (stiffness_there(design, Operating(load_Nm=load_Nm)) * inverse) ** 0.5
@@ -66,10 +58,7 @@ def passed_moment_Nm(design: Design, load_Nm: float) -> Any:
 
 
 def breakaway_torque_Nm(design: Design, load_Nm: float, direction: int) -> Any:
-    """Motor torque that starts motion in a direction; 0 where the load already does.
-
-    The breakaway ratio acts on the dry part only, not on the offset and not on the load (model.md section 6).
-    """
+    """Motor torque that starts motion, 0 where the load does; the ratio is of dry friction (section 6)."""
     needed = _held_torque(design, load_Nm, direction) - direction * passed_moment_Nm(design, load_Nm)
     return larger(needed, 0.0)
 
@@ -80,17 +69,11 @@ def _held_torque(design: Design, load_Nm: float, direction: int) -> Any:
     ratio = friction.breakaway_ratio if friction.law == "coulomb" else 0.0
     total = dry_torque(design, load_Nm, direction) * ratio + direction * friction.offset_torque_Nm
     ripple = design.load.over_angle.ripple_Nm / design.ratio_behind_coupling
-    total = total + design.motor.over_angle.ripple_Nm + _through_train(design, ratio) * ripple
+    total = total + design.motor.over_angle.ripple_Nm + train_gain(design, ratio) * ripple
     if behind is None or design.coupling is None:
         return total
     locked = behind.dry_torque_Nm * behind.breakaway_ratio + direction * behind.offset_torque_Nm
-    return total + _through_train(design, ratio) * locked
-
-
-def _through_train(design: Design, ratio: Any = 1.0) -> Any:
-    """Motor torque per torque at the coupling: what the train passes, and friction that grows with it."""
-    passed = 1 / design.ratio_to_coupling if design.load.path == "back-drivable" else 0.0
-    return passed + ratio * design.friction.load_coefficient * design.ratio_behind_coupling
+    return total + train_gain(design, ratio) * locked
 
 
 def held_moment_Nm(design: Design, torque_Nm: float) -> float:
@@ -105,20 +88,16 @@ def held_moment_Nm(design: Design, torque_Nm: float) -> float:
     """
     way = 1 if torque_Nm > 0.0 else -1
     left = abs(torque_Nm) - dry_torque(design, 0.0, way) - way * design.friction.offset_torque_Nm
-    at_coupling = max(left, 0.0) / max(_through_train(design), 1.0 / design.ratio_to_coupling)
+    at_coupling = max(left, 0.0) / max(train_gain(design), 1.0 / design.ratio_to_coupling)
     return way * float(at_coupling) * design.ratio_behind_coupling
 
 
 def driven_inertia_kgm2(design: Design) -> Any:
-    """Inertia that the motor speeds up, at its shaft; behind a coupling with the friction of its torque.
-
-    ``T_s = J_l dW/dt + …`` is carried as ``T_s (1/N_c + CM')`` (model.md section 6); a rigid train rubs with
-    the load's moment alone.
-    """
+    """Inertia that the motor speeds up, at its shaft; a coupling's torque is carried with its friction."""
     if design.coupling is None:
         return design.inertia_kgm2
     behind = design.load_side_inertia_kgm2 / design.ratio_to_coupling
-    return design.motor_side_inertia_kgm2 + _through_train(design) * behind
+    return design.motor_side_inertia_kgm2 + train_gain(design) * behind
 
 
 def resistance_Nm(design: Design, load_Nm: float, direction: int) -> Any:
@@ -128,7 +107,7 @@ def resistance_Nm(design: Design, load_Nm: float, direction: int) -> Any:
     total = total + passed_moment_Nm(design, abs(load_Nm))
     if behind is None or design.coupling is None:
         return total
-    return total + _through_train(design) * (behind.dry_torque_Nm + direction * behind.offset_torque_Nm)
+    return total + train_gain(design) * (behind.dry_torque_Nm + direction * behind.offset_torque_Nm)
 
 
 def _speed_slopes(design: Design, direction: int) -> list[tuple[float, Any]]:
@@ -136,9 +115,9 @@ def _speed_slopes(design: Design, direction: int) -> list[tuple[float, Any]]:
     behind, damping = design.load.friction, design.load.moment_damping_Nms_rad
     more: Any = 0.0
     if behind is not None and design.coupling is not None:
-        more = _through_train(design) * behind.viscous_Nms_rad / design.ratio_to_coupling
+        more = train_gain(design) * behind.viscous_Nms_rad / design.ratio_to_coupling
     if present(damping):
-        more = more + _through_train(design) * damping / (design.total_ratio * design.ratio_behind_coupling)
+        more = more + train_gain(design) * damping / (design.total_ratio * design.ratio_behind_coupling)
     pieces = friction_slopes(design, direction)
     return [(start, slope + more) for start, slope in pieces] if present(more) else pieces
 
@@ -220,7 +199,7 @@ def _one_way(design: Design, load_Nm: float, direction: int) -> Capability:
 
 
 def _with_own_Nm(design: Design, load_Nm: float) -> Any:
-    """A load torque and the load's own moment at output angle 0 (gravity), without gear error, together."""
+    """A load torque and the load's own at output angle 0 (gravity), without gear error."""
     return load_Nm + design.load.over_angle.at(0.0, moving=True)
 
 

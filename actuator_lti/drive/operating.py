@@ -1,8 +1,4 @@
-"""The operating point about which a drive is made linear: friction, contact, load, direction, angle.
-
-What a drive feels that depends on its angle is asked here; which effects these are load and motor say of
-themselves (`OverAngle`).
-"""
+"""The operating point about which a drive is made linear: friction, contact, load, direction, angle."""
 
 from __future__ import annotations
 
@@ -30,11 +26,9 @@ CONTACT = {"driving": 1.0, "driven": -1.0, "sliding": 1.0}  # sgn(w T_s) of the 
 class Operating:
     """Where a drive stands when it is made linear (model.md sections 3 and 6)."""
 
-    # sliding: the viscous slope, as the dry part is a constant while the speed keeps its sign. rest: plus
-    # Tc/w_s, the slope of the tanh law at zero speed. describing-function: the slope that dry friction has
-    # for a sinusoidal speed. driving, driven (only with a coupling): sliding, with the coupling's torque
-    # against or with the motion, which decides the sign of the load-dependent friction; sliding is driving
-    # there. gap: the coupling open, k = c = 0
+    # sliding: the viscous slope, dry friction is a constant. rest: plus Tc/w_s. describing-function: for a
+    # sinusoidal speed. driving, driven (with a coupling): sliding, its torque against (as in sliding) or with
+    # the motion, the sign of the load-dependent friction. gap: the coupling open, k = c = 0
     point: OperatingPoint = "sliding"
     load_Nm: float = 0.0  # at the output shaft; enters through Tc = C0 + CM |M_ext|, equation (9)
     speed_amplitude_rad_s: float | None = None  # W (peak, motor side), for the describing function
@@ -42,13 +36,9 @@ class Operating:
     rotor: RotorState = "free"
     speed_rad_s: float = 0.0  # of the motor, at which the slope of a friction map is taken
     angle_rad: float = 0.0  # of the output, at which torques that bend with the angle are made linear
-    # Of the coupling there, at its own shaft: the motor stands at N angle + N_c twist. A spring that bends
-    # has the stiffness of this twist; without one, of that under ``load_Nm``
-    twist_rad: float = 0.0
+    twist_rad: float = 0.0  # of the coupling: where a spring that bends stands; 0: that under ``load_Nm``
     torques_held: bool = False  # whether torques that depend on the angle are taken without their slopes
-    # Whether they act at every instant, as they do on a motor, where model.md section 11 (and so the
-    # simulator) holds them over a tick
-    torques_at_once: bool = False
+    torques_at_once: bool = False  # whether they act at every instant, not held over a tick (section 11)
 
     def __post_init__(self) -> None:
         """Refuse what is no operating point."""
@@ -58,8 +48,8 @@ class Operating:
             finite_number(name, getattr(self, name))
         W, allowed = self.speed_amplitude_rad_s, "positive, in rad/s (motor side)"
         needed = self.point == "describing-function"
-        if (needed or W is not None) and finite_number("speed_amplitude_rad_s", W, allowed) <= 0.0:
-            raise InputError(f"speed_amplitude_rad_s = {W}: must be {allowed}")
+        if needed or W is not None:
+            finite_number("speed_amplitude_rad_s", W, allowed, lambda number: number > 0.0)
         if W is not None and not needed:
             at = f"operating_point = {self.point!r}"
             raise InputError(f"speed_amplitude_rad_s = {W}: {at} has none; allowed: with describing-function")
@@ -95,6 +85,17 @@ def dry_torque(design: Design, load_Nm: float, direction: int) -> Any:
     if points := design.friction.map(direction):
         return points[0].torque_Nm + design.friction.load_coefficient * abs(load_Nm)
     return design.friction.dry_Nm(load_Nm, direction)
+
+
+def train_gain(design: Design, share: Any = 1.0) -> Any:
+    """Motor torque per torque at the coupling: what the train passes, and so much of its friction by load."""
+    passed = 1 / design.ratio_to_coupling if design.load.path == "back-drivable" else 0.0
+    return passed + share * design.friction.load_coefficient * design.ratio_behind_coupling
+
+
+def reaction(design: Design, at: Operating) -> Any:
+    """Share of the coupling's torque that the motor feels: 1/N_c (back-drivable) + CM' sgn(w T_s)."""
+    return train_gain(design, CONTACT.get(at.point, 0.0))
 
 
 def rubs(design: Design) -> bool:
@@ -191,10 +192,7 @@ IN_MOTION = "in motion"
 
 
 def turned(design: Design) -> Iterator[tuple[str, Design]]:
-    """The drive where its cogging and gear error are steepest, and in a motion that averages them.
-
-    On a crest they drive the rotor away, in a notch they hold it: margins are extreme there.
-    """
+    """The drive where cogging and gear error are steepest, margins extreme, and in a motion that averages."""
     motor, load = design.motor, design.load
     waves = {"cogging": motor.cogging_Nm, "gear error": load.gear_error_Nm}
     acting = " and ".join(name for name, peak_Nm in waves.items() if peak_Nm)
@@ -223,15 +221,12 @@ def moment_slope(design: Design, at: Operating) -> Any:
 
 
 def pushes_away(design: Design, at: Operating) -> Any:
-    """Whether a torque grows with the deflection that it makes, or friction falls with the speed.
-
-    A bool, or an array of stacked designs.
-    """
+    """Whether a torque grows with its deflection, or friction falls with the speed; of stacks an array."""
     return (moment_slope(design, at) > 0) | (torque_slope(design, at) > 0) | (slope_at(design, at) < 0)
 
 
 def level(design: Design) -> Design:
-    return replace(design, motor=design.motor.level(), load=design.load.level())
+    return replace(design, motor=design.motor.straight(), load=design.load.level())
 
 
 def straight(design: Design) -> Design:

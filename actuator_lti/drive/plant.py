@@ -1,6 +1,4 @@
-"""The continuous plant of a drive at an operating point, rigid or with an elastic coupling.
-
-Equations (1), (2), (14), and model.md section 6.
+"""The continuous plant of a drive at an operating point: equations (1), (2), (14), model.md section 6.
 
 Coefficients may be arrays of shape (K,) stacked over designs: then the matrices have K in front.
 """
@@ -13,9 +11,9 @@ import numpy as np
 
 from actuator_lti.design.model import Design, Motor
 from actuator_lti.drive.operating import (
-    CONTACT,
     Operating,
     moment_slope,
+    reaction,
     slope_at,
     stiffness_there,
     torque_slope,
@@ -31,23 +29,16 @@ MatrixEntries = dict[tuple[str, str], Any]  # the same by the names of row and c
 class Plant:
     """``dx/dt = A x + B_u u + B_T T + B_M M_ext`` of the slipping drive."""
 
-    # ``("i", "w", "th")`` in A, rad/s, rad at the motor; without ``"i"`` for a torque source; ``("i",)`` with
-    # the rotor locked. With a coupling also ``"W"``, the speed behind it in rad/s, and ``"twist"`` = th/N_c -
-    # phi in rad, both at its own shaft: so the absolute angle is one state, which no inner loop sees
+    # i, w, th in A, rad/s, rad at the motor (a torque source has no i, a locked rotor i alone); behind a
+    # coupling W and twist = th/N_c - phi at its own shaft: one absolute angle, which no inner loop sees
     states: tuple[str, ...]
     A: np.ndarray  # shape (..., n, n): without the load's own torques, see `moment`
-    # Shape (..., n): effect of the voltage (V, or the drive signal of a torque source), of a torque in N m
-    # that accelerates the motor, and of a moment in N m that pushes the output shaft forward
-    B_u: np.ndarray
-    B_T: np.ndarray
-    B_M: np.ndarray
-    # The motor's own torque, and the load's own torque on the output shaft, as combinations of states and
-    # rows; both are held over a tick. Empty where there is none, or it does not reach the plant
-    torque: Entries
-    moment: Entries
-    # Angles and torques as combinations of states: ``output_angle``, ``phi`` and ``T_s`` (angle behind the
-    # coupling, its torque) and ``load_speed`` (motor speed that the output's sensor sees)
-    rows: dict[str, Entries]
+    B_u: np.ndarray  # shape (..., n): of the voltage in V, or the drive signal of a torque source
+    B_T: np.ndarray  # of a torque in N m that accelerates the motor
+    B_M: np.ndarray  # of a moment in N m that pushes the output shaft forward
+    torque: Entries  # the motor's own, of states and rows, held over a tick; empty where there is none
+    moment: Entries  # the load's own on the output shaft, in the same way
+    rows: dict[str, Entries]  # angles, speeds and T_s of states; load_speed: the motor's that its sensor sees
 
 
 def matrix(names: tuple[str, ...], entries: MatrixEntries) -> np.ndarray:
@@ -150,13 +141,6 @@ def _own_moment(design: Design, at: Operating) -> Entries:
     damping = design.load.moment_damping_Nms_rad / design.total_ratio
     gains = {"output_angle": moment_slope(design, at), "load_speed": -damping}
     return {row: gain for row, gain in gains.items() if np.any(gain != 0)}
-
-
-def reaction(design: Design, at: Operating) -> Any:
-    """Share of the coupling's torque that the motor feels: 1/N_c (back-drivable) + CM' sgn(w T_s)."""
-    passed = 1 / design.ratio_to_coupling if design.load.path == "back-drivable" else 0.0
-    sign = CONTACT.get(at.point, 0.0)
-    return passed + sign * design.friction.load_coefficient * design.ratio_behind_coupling
 
 
 def _elastic(design: Design, motor: Motor, at: Operating) -> Plant:

@@ -73,10 +73,7 @@ def profile_onset_rad(design: Design, omega_rad_s: np.ndarray) -> np.ndarray:
 
 
 def profile_passes_rad_s(design: Design, peak_rad: float) -> float:
-    """Up to which frequency a sine command of a peak keeps rate and acceleration, see `profile_onset_rad`.
-
-    ``inf``: at every one.
-    """
+    """Up to which frequency a sine command of a peak keeps rate and acceleration; ``inf``: at all."""
     command, control = design.command, design.controller
     if control.position is None:
         return inf

@@ -51,12 +51,8 @@ class Limiter:
     name: str
     words: str
     signal: str  # what stands in front of it, of `SIGNALS`
-    # A clamp of the signal, of its change per update, or of its mean square in the long run; or no limit of a
-    # loop but what the drive makes of its command
-    kind: Kind
-    # Attribute of `Limits` that holds it; empty for ``torque-command``, which has that of the stage's target,
-    # and for the command
-    limit: str
+    kind: Kind  # a clamp of the signal, of its change per update, of its mean square, or of the command
+    limit: str  # attribute of `Limits`; empty: that of the stage's target, or of the command
     bit: int  # of the limit flags that a run writes (`REST_BIT` says that the rotor is at rest)
     always: bool = False  # whether every drive that has the signal is told of it, without such a limit too
 

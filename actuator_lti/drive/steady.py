@@ -1,7 +1,6 @@
-"""The drive in steady motion: torque, current and voltage that belong together (equations (1), (2) at rest).
+"""The drive in steady motion, equations (1), (2): torque, current and voltage; gains at rest, droop at speed.
 
-Everything outside `actuator_lti.drive` that needs ``u = R i + kE w`` or ``M = kM i`` asks here; and what the
-controllers make of a command at rest: gain, and droop at speed.
+Everything outside `actuator_lti.drive` that needs ``u = R i + kE w`` or ``M = kM i`` asks here.
 """
 
 import math
@@ -73,16 +72,12 @@ def stage_gain(gain: Any, law: Law | None) -> Any:
     return gain if law is None else law.steady("command")
 
 
-def steady_gain(item: Any) -> Any:
-    """Gain of a filter at DC: 1 but for a sampled biquad."""
-    b, a = item.polynomials if item.kind == "biquad" else ((1.0,), (1.0,))
-    return sum(b) / sum(a)
-
-
 def filtered(design: Design, place: Any) -> Any:
-    """Gain at DC of the velocity loop's filters at a place."""
+    """Gain at DC of the velocity loop's filters at a place: 1 but for sampled biquads."""
     velocity = design.controller.velocity
-    return math.prod(steady_gain(item) for item in velocity.filters_on(place)) if velocity else 1.0
+    filters = () if velocity is None else velocity.filters_on(place)
+    biquads = (item.polynomials for item in filters if item.kind == "biquad")
+    return math.prod((sum(b) / sum(a) for b, a in biquads), start=1.0)
 
 
 def torque_gain_Nm_rad(design: Design) -> Any:

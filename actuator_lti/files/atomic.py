@@ -28,10 +28,7 @@ _OPEN_FILE = re.compile(r"/(?:(?:dev|proc/self)/fd/(\d{1,6})|dev/(stdin|stdout|s
 
 
 def write_text(path: AnyPath, text: str) -> None:
-    """Write text as UTF-8 with the line ends given; the old content stays until the new one is on disk.
-
-    An InputError if the folder cannot be made or written.
-    """
+    """Write UTF-8 with the line ends given, whole or not at all; an InputError where it cannot be written."""
     write_bytes(path, text.encode("utf-8"))
 
 
@@ -55,10 +52,7 @@ def write_together(files: Mapping[Name, bytes] | Iterable[tuple[Name, bytes]]) -
 
 
 def _write_all(files: Iterable[tuple[AnyPath, Callable[[BinaryIO], object]]]) -> None:
-    """Fill every file beside its place, then move all into place; devices and pipes are written to last.
-
-    The disk is waited for when all are written: many files then reach it in few turns.
-    """
+    """Fill all beside their places, then move them there; devices and pipes last, one wait for the disk."""
     staged: list[tuple[Path, Path]] = []
     through: list[tuple[BinaryIO, Path]] = []
     path = Path()
@@ -85,7 +79,9 @@ def _write_all(files: Iterable[tuple[AnyPath, Callable[[BinaryIO], object]]]) ->
     except (OSError, ValueError) as error:
         if isinstance(error, InputError):
             raise
-        raise InputError(f"cannot write: {reason(error)}", where=_named(error, path)) from error
+        named = str(getattr(error, "filename", None) or "")
+        where = str(path) if not named or named.endswith(_PART) else named  # not one of our own
+        raise InputError(f"cannot write: {reason(error)}", where=where) from error
     finally:
         for temporary, _ in staged:
             with suppress(OSError):
@@ -139,7 +135,6 @@ def _write_through(held: BinaryIO, path: Path) -> None:
 
 
 def _stage(path: Path, write: Callable[[BinaryIO], object]) -> Path:
-    """Fill a file beside its place, and give the temporary path."""
     path.parent.mkdir(parents=True, exist_ok=True)
     temporary = path.parent / f".{secrets.token_hex(8)}{_PART}"
     try:
@@ -159,9 +154,3 @@ def _sync(path: Path) -> None:
         os.fsync(handle)
     finally:
         os.close(handle)
-
-
-def _named(error: OSError | ValueError, path: Path) -> str:
-    """The path that stands in the way, never one of our own temporary ones."""
-    named = str(getattr(error, "filename", None) or "")
-    return str(path) if not named or named.endswith(_PART) else named

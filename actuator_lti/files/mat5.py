@@ -1,9 +1,8 @@
 """Real numeric arrays out of a MATLAB level 5 file, by a small reader that trusts nothing in it.
 
-A reader of its own because the usual one can crash the interpreter on a damaged file. Source of the layout:
-MathWorks, "MAT-File Format" (R2019b), chapter 1. Texts and cells of texts are read as lists of names, sparse
-matrices as full ones, fields of a structure as ``name.field``; all else is passed over and named. So are
-complex arrays, which stand beside the real ones for whoever asks for them.
+The usual one can crash the interpreter on a damaged file. Layout: MathWorks, "MAT-File Format" (R2019b),
+chapter 1. Texts and cells of texts are lists of names, sparse matrices full ones, fields of a structure
+``name.field``; all else is passed over and named, complex arrays too, which stand beside the real ones.
 """
 
 import struct
@@ -68,8 +67,6 @@ Part = tuple[int, bytes, int]  # type, content, place
 
 
 class _Reader:
-    """Takes elements of one byte order into a content."""
-
     def __init__(self, order: str) -> None:
         self.order, self.content = order, MatContent()
 
@@ -124,7 +121,6 @@ class _Reader:
         return len(values) == 1
 
     def _text(self, name: str, parts: list[Part], _place: int) -> bool:
-        """A text: one name for each row of a character array."""
         shape = self._numbers(parts[1])
         if len(parts) < 4 or shape is None or len(shape) != 2:
             return False
@@ -138,7 +134,6 @@ class _Reader:
         return True
 
     def _cell(self, name: str, parts: list[Part], _place: int) -> bool:
-        """A cell array whose cells are all texts of one row."""
         result: list[str] = []
         for cell in parts[3:]:
             texts = self._inside(cell).texts.values() if self._class_of(cell) == TEXT else ()
@@ -182,7 +177,6 @@ class _Reader:
         return int(struct.unpack(f"{self.order}I", part[1][:4])[0])
 
     def elements(self, data: bytes, place: int = 0) -> Iterator[Part]:
-        """Data elements from a place on, each within the data."""
         while place + 8 <= len(data):
             first, size = struct.unpack_from(f"{self.order}II", data, place)
             if first >> 16:
@@ -210,7 +204,6 @@ class _Reader:
 
 
 def _inflated(body: bytes, place: int) -> bytes:
-    """A compressed element, unpacked within bounds."""
     unpack = zlib.decompressobj()
     try:
         inflated = unpack.decompress(body, MAX_BYTES)

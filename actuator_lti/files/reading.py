@@ -1,8 +1,7 @@
 """The one reader of files: from a path to bytes, text and a tree of plain values; nothing physical.
 
-Size, kind of file, encoding, depth, number of values, length of texts, integers and control characters are
-checked here for every file that a user or somebody else wrote: designs, studies, settings, campaigns, record
-descriptions, report.json. What comes out may be printed and written to other files as it is.
+Size, encoding, depth, number of values, texts, integers and control characters are checked here for every
+file that somebody wrote: what comes out may be printed and written to other files as it is.
 """
 
 import json
@@ -60,10 +59,7 @@ def as_path(path: AnyPath) -> Path:
 
 
 def open_regular(path: AnyPath, what: str = "file") -> BufferedReader:
-    """Open a regular file for reading; a directory, a device or a pipe is refused without waiting for it.
-
-    An InputError names the file and what is allowed.
-    """
+    """Open a regular file for reading; a directory, device or pipe is an InputError without a wait."""
     with in_file(shown_path(path)):
         try:
             handle = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0))
@@ -89,7 +85,6 @@ def _near(path: AnyPath) -> str:
 
 
 def reason(error: OSError | ValueError) -> str:
-    """What the system says is wrong."""
     return (error.strerror if isinstance(error, OSError) else None) or str(error)
 
 
@@ -125,10 +120,7 @@ def read_text(path: AnyPath, what: str = "design file", most: Bound = TOML_BYTES
 def read_toml(
     path: AnyPath, what: str = "design file", size: Bound = TOML_BYTES, values: Bound = TOML_VALUES
 ) -> Tree:
-    """The tree of a TOML file: size, encoding, syntax, depth, texts and integers checked.
-
-    An InputError names the file, the place and what is allowed.
-    """
+    """The tree of a TOML file: size, encoding, syntax, depth, texts and integers checked."""
     return parse_toml(read_text(path, what, size), shown_path(path), size=size, values=values)
 
 
@@ -150,7 +142,10 @@ def parse_toml(text: str, where: str, *, size: Bound = TOML_BYTES, values: Bound
     with in_file(where):
         if len(text) > size.most:
             raise InputError(f"is larger than allowed: {size.allowed}")
-        _refuse_long_keys(text)
+        for number, line in enumerate(text.splitlines(), 1):
+            head = line.partition("=")[0]
+            if head.count(".") > bounds.KEY_PARTS.most and not head.lstrip().startswith("#"):
+                raise InputError(f"line {number}: a key {_too_deep('', TOML_DEPTH)}")
         try:
             tree = tomllib.loads(text)
         except RecursionError:
@@ -226,13 +221,6 @@ def _no_key_twice(pairs: list[tuple[str, Any]]) -> Tree:
     if twice is not None:
         raise ValueError(f"the key {shown(twice)} stands twice in one table")
     return dict(pairs)
-
-
-def _refuse_long_keys(text: str) -> None:
-    for number, line in enumerate(text.splitlines(), 1):
-        head = line.partition("=")[0]
-        if head.count(".") > bounds.KEY_PARTS.most and not head.lstrip().startswith("#"):
-            raise InputError(f"line {number}: a key nested too deeply; allowed: {TOML_DEPTH.most} levels")
 
 
 def _plain(text: str, longest: int = 60) -> str:

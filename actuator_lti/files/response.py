@@ -41,9 +41,9 @@ class RecordedResponse(Compared):
     coherence: Floats  # ordinary coherence, 0 to 1
     name: str  # of the file
     left_out: int = 0  # rows without numbers, without coherence, or at 0 Hz
-    # Of the circle about each value that holds the true one in 99 of 100 cases, over the size of the value
+    # Of the circle that holds the true value in 99 of 100 cases, over its size; and where it is from
     radius: Floats = field(default_factory=lambda: np.array(np.nan))
-    noise: str = ""  # where the radius is from
+    noise: str = ""
     read_as: str = ""  # how the columns of a file were taken
     period_s: float | None = None  # sampling period of which it says that it is; None where it says none
 
@@ -125,7 +125,6 @@ def read_response(source: Path | str | Any, averages: int | None = None) -> Reco
 
 
 def _table(text: str) -> tuple[dict[str, Floats], bool]:
-    """Columns by their headings, and whether there is one."""
     every = [(at, line.strip()) for at, line in enumerate(text.splitlines(), 1)]
     every = [(at, line) for at, line in every if line and line[0] not in "#%"]
     places, lines = [at for at, _ in every], [line for _, line in every]
@@ -194,10 +193,7 @@ def _response(columns: Mapping[str, Floats], name: str, averages: int | None) ->
 
 
 def _averaged(read: RecordedResponse) -> RecordedResponse:
-    """Each frequency once, rising, with the mean of its rows and the noise as they scatter.
-
-    The same value again is the same row, not another measurement.
-    """
+    """Each frequency once, rising: mean and scatter of its rows; the same value again is the same row."""
     f, z = read.frequency_hz, read.response
     order = np.lexsort((z.imag, z.real, f))
     kept = order[np.append(True, (np.diff(f[order]) != 0.0) | (np.diff(z[order]) != 0.0))]

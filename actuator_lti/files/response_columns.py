@@ -79,7 +79,6 @@ def unit_of(role: str, name: str, values: Floats) -> str:
 
 
 def _said(role: str, name: str) -> str:
-    """What the name of a column says of its unit."""
     return next((unit for like, unit in _UNITS[role][1].items() if re.search(like, name, re.I)), "")
 
 
@@ -89,7 +88,6 @@ def _size(values: Floats, unit: str) -> Floats:
 
 
 def complex_values(table: Mapping[str, Floats], units: Mapping[str, str]) -> NDArray[np.complex128]:
-    """The response, from its parts or from magnitude and phase."""
     if "real" in table:
         return table["real"] + 1j * table["imaginary"]
     with np.errstate(over="ignore", under="ignore", invalid="ignore"):
@@ -114,8 +112,12 @@ def refuse_contradiction(
 
 def _off(role: str, name: str, values: Floats, f: Floats, z: NDArray[np.complex128]) -> Floats | None:
     """How far off a column is, over the size; ``None`` where it does not say that it is the same."""
-    if role == "frequency":
-        return _off_frequency(name, values, f)
+    if role == "frequency":  # in Hz or rad/s where its name does not say so
+        if _FREQUENCY_UNIT.sub("", name.lower()) not in ("f", "freq", "frequency", "omega", "w"):
+            return None
+        said = _said("frequency", name)
+        off = [values * SI[one] / f - 1.0 for one in ([said] if said else ["Hz", "rad/s"])]
+        return min(off, key=lambda one: float(np.median(np.abs(one))))
     if role in ("real", "imaginary"):
         return (values - (z.real if role == "real" else z.imag)) / np.abs(z)
     if role not in ("size", "phase") or not (unit := _said(role, name)):
@@ -123,15 +125,6 @@ def _off(role: str, name: str, values: Floats, f: Floats, z: NDArray[np.complex1
     if role == "size":
         return _size(values, unit) / np.abs(z) - 1.0
     return cast("Floats", np.angle(np.exp(1j * SI[unit] * values) / z))
-
-
-def _off_frequency(name: str, values: Floats, f: Floats) -> Floats | None:
-    """The same of a frequency, which is in Hz or rad/s where its name does not say so."""
-    if _FREQUENCY_UNIT.sub("", name.lower()) not in ("f", "freq", "frequency", "omega", "w"):
-        return None
-    unit = _said("frequency", name)
-    off = [values * SI[one] / f - 1.0 for one in ([unit] if unit else ["Hz", "rad/s"])]
-    return min(off, key=lambda one: float(np.median(np.abs(one))))
 
 
 def noise_of(
@@ -171,7 +164,6 @@ def _deviation(table: Mapping[str, Floats], units: Mapping[str, str]) -> Floats:
 def taken_as(
     columns: Mapping[str, Floats], found: Mapping[str, str], units: Mapping[str, str], *, known: bool
 ) -> str:
-    """How the columns were taken, and which were not."""
     told = []
     for role in sorted(found, key=lambda role: (*_ORDER, role).index(role)):
         unsaid = units[role] and not _said(role, found[role])

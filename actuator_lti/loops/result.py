@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from actuator_lti.drawing import draw
 from actuator_lti.errors import InputError
-from actuator_lti.systems.plain_system import as_control
+from actuator_lti.systems.as_control import as_control
 
 Form = Literal["sampled", "continuous", "ideal"]
 InnerLoops = Literal["closed", "open"]

@@ -17,8 +17,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from actuator_lti.drive.operating import Operating, OperatingPoint
-from actuator_lti.drive.plant import reaction
+from actuator_lti.drive.operating import Operating, OperatingPoint, reaction
 from actuator_lti.drive.wiring import wire
 from actuator_lti.loops.tick import Block, TickProgram, mean_response, pruned, siso
 

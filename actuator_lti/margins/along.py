@@ -22,6 +22,8 @@ from actuator_lti.margins.trust import Doubtful
 from actuator_lti.types import Complex, Real
 
 _ROUNDED = 1e-12
+_STEP, _ROUNDS = 1e-6, 12  # relative; of secants
+_ACCURATE = 1e-9  # relative: a smallest distance
 _METHOD = "factors of the loop, bounded over whole intervals of frequency; crossings polished by Newton"
 
 
@@ -116,7 +118,40 @@ class Along:
         ]
         inside = [w for _, w in best if 0.0 < w < math.inf]
         L = dict(zip(inside, self.loop.at(np.array(inside)).tolist(), strict=True)) if inside else {}
-        return [(d.at(L[w]) if w in L else value, w) for d, (value, w) in zip(distances, best, strict=True)]
+        found = [(d.at(L[w]) if w in L else value, w) for d, (value, w) in zip(distances, best, strict=True)]
+        # where the factors are off, so is their smallest place, and the value there by the square of that
+        off = self.factors.slack / math.sqrt(_ACCURATE)
+        pairs = zip(distances, found, strict=True)
+        return [self._lowest(d, place) if place[0] < off else place for d, place in pairs]
+
+    def _lowest(self, distance: Distance, place: Place) -> Place:
+        """The smallest value of the loop itself next to a place: where its own slope is zero, by secants."""
+        loop, (value, w) = self.loop, place
+        if not 0.0 < w < math.inf:
+            return place
+
+        def slope_at(x: float) -> tuple[float, complex]:
+            at = np.array([x])
+            L, slope = loop.response_and_slope(at)
+            turned, late = loop.late_rate(at, slope / L)[0], complex(loop.late(at, L)[0])
+            above, below = distance.over(late, 1.0)
+            if not above or not below:
+                return 0.0, late
+            return float((late * turned * (distance.a / above - distance.c / below)).real), late
+
+        x = float(loop.x(np.array([w]))[0])
+        before, step = slope_at(x)[0], _STEP * x
+        for _ in range(_ROUNDS):
+            x += step
+            at = math.tan(0.5 * x) if loop.in_z else x
+            if not 0.0 < at < math.inf:
+                break
+            slope, L = slope_at(x)
+            value, w = min((value, w), (distance.at(L), at))
+            if slope == before or not abs(step) > _ROUNDED * x:
+                break
+            before, step = slope, -slope * step / (slope - before)
+        return value, w
 
     def _turned(self) -> int:
         """Turns of 1 + L about the origin from zero frequency to the end of the axis, in half turns."""

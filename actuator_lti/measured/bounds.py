@@ -53,10 +53,8 @@ class Strip:
 
     def over(self, k: int, t0: float, t1: float) -> tuple[float, float]:
         """Smallest and largest value over a part of interval k."""
-        t = np.array([t0, t1])
-        low, high = (side[k, 0] if side[k, 0] == side[k, 1] else side[k, 0] + t * (side[k, 1] - side[k, 0])
-                     for side in (self.low, self.high))  # fmt: skip
-        return float(np.min(low)), float(np.max(high))
+        low, high = (_along(side[k : k + 1], np.array([t0, t1])) for side in (self.low, self.high))
+        return float(low.min()), float(high.max())
 
 
 @dataclass(frozen=True)
@@ -187,17 +185,16 @@ def distance_ranges(L: Complex, radius: Real, known: Bounds) -> tuple[Range, Ran
     return (float(least.min()), float(d.min())), (float(_least_alpha(a, b, cos).min()), float(above.min()))
 
 
+def _along(side: Real, t: Real) -> Real:
+    """A side of the strip at parts of each interval; it may be infinite at both ends."""
+    start, end = side[:, :1], side[:, 1:]
+    with np.errstate(invalid="ignore"):
+        return np.where(start == end, start, start + t * (end - start))
+
+
 def _pieces(strip: Strip) -> tuple[Real, Real]:
     """Smallest and largest value over each piece of each interval."""
-    t = np.linspace(0.0, 1.0, _PIECES + 1)
-
-    def along(side: Real) -> Real:
-        start, end = side[:, :1], side[:, 1:]
-        with np.errstate(invalid="ignore"):
-            inside = start + t * (end - start)
-        return np.where(start == end, start, inside)  # infinity at both ends
-
-    low, high = along(strip.low), along(strip.high)
+    low, high = (_along(side, np.linspace(0.0, 1.0, _PIECES + 1)) for side in (strip.low, strip.high))
     return np.minimum(low[:, :-1], low[:, 1:]), np.maximum(high[:, :-1], high[:, 1:])
 
 

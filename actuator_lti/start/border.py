@@ -1,7 +1,6 @@
 """The public border: an argument of another kind than its annotation says is refused in one line.
 
-The border is the package: a name taken from it looks at its arguments inside the house too; a function taken
-from the module that defines it looks at nothing, unless that module is public itself (`nonlinear.commands`).
+A name taken from a package looks at its arguments; taken from the module that defines it, at nothing.
 """
 
 import sys

@@ -67,14 +67,13 @@ def _kind(hint: Any) -> Kind:
         return f"a function of {len(inside[0])} arguments", lambda given: _takes(given, len(inside[0]))
     if origin in (Union, UnionType):
         others = {get_origin(one) or one for one in inside} - {str, NoneType}
-        return ANYTHING if PathLike in others and len(others) > 1 else _one_of(list(map(_kind, inside)))
+        each = list(map(_kind, inside))
+        words = " or ".join(words for words, _ in each)
+        known = PathLike in others and len(others) > 1
+        return ANYTHING if known else (words, lambda given: any(holds(given) for _, holds in each))
     if origin in (tuple, list, Sequence, Collection, Iterable) and inside:
         return _several(origin, [_kind(one) for one in inside if one is not Ellipsis])
     return _PLAIN.get(origin) or _instance(origin)
-
-
-def _one_of(kinds: Sequence[Kind]) -> Kind:
-    return " or ".join(words for words, _ in kinds), lambda given: any(holds(given) for _, holds in kinds)
 
 
 def _several(series: Any, kinds: Sequence[Kind]) -> Kind:

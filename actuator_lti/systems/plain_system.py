@@ -2,7 +2,7 @@
 
 The equations of the latter are those of `actuator_lti.systems.delay_system`, whose python-control systems
 are made of these; how two systems are joined and how one is evaluated stands here alone. The python-control
-system of a plain one is made where somebody asks for it (`as_control`): importing python-control takes a
+system of a plain one is made where somebody asks for it (`as_control.py`): importing python-control takes a
 second, and margins, bandwidths and steps do not need it.
 """
 
@@ -198,23 +198,3 @@ def response(system: Any, points: np.ndarray) -> np.ndarray:
     y = system.D11 + system.C1 @ inner[:, :n] + (system.D12 * E[:, None, :]) @ inner[:, n:]
     y[~np.isfinite(inner).all(axis=(1, 2))] = complex(np.inf, np.nan)
     return np.asarray(np.moveaxis(y, 0, -1))
-
-
-def as_control(system: Any) -> Any:
-    """The named python-control system of a plain one; anything else as it is.
-
-    With exact delays it is an `actuator_lti.systems.delay_system.DelaySystem`, without a
-    `control.StateSpace`.
-    """
-    if not isinstance(system, PlainDelaySystem | PlainSystem):
-        return system
-    names: Any = {"inputs": [system.source], "outputs": [system.signal], "name": system.name}
-    if isinstance(system, PlainDelaySystem):
-        from actuator_lti.systems.delay_system import DelaySystem
-
-        return DelaySystem.of(system, **names)
-    import control
-
-    more = {"states": [state.replace(".", "_") for state in system.states]} if system.states else {}
-    parts = (system.A, system.B, system.C, system.D, system.dt)
-    return control.ss(*parts, remove_useless_states=False, **names, **more)

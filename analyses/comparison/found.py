@@ -1,8 +1,7 @@
 """What is found of each design of a comparison: figures with their names, and where they are kept.
 
-On disk they are JSON, so that a study that was stopped goes on. An entry's name is the hash of all that it
-depends on (texts of both designs, commands, code, libraries). It is checked like any other file when it is
-read; one that is damaged is computed again.
+JSON, by the hash of all that it depends on (designs, commands, code, libraries), so that a study goes on;
+what is damaged is computed again.
 """
 
 from __future__ import annotations
@@ -72,8 +71,7 @@ class LargeSignal:
     """Large-signal figures, taken of every design at the same commands."""
 
     frequencies_hz: tuple[float, ...]  # where the largest linear amplitude is given
-    # Step of full deflection
-    deflection_rad: float
+    deflection_rad: float  # of the step
     duration_s: float
     loads_Nm: tuple[float, ...]
 
@@ -105,13 +103,8 @@ class LargeSignal:
         return figures
 
 
-def beside(base: Design, design: Design, figures: Figures) -> dict[str, float | None]:
-    """Figures by their keys; of another axis, or of another command, by keys of their own ("... linear")."""
-    return {key + _apart(key, base, design): value for key, value in figures.items()}
-
-
-def _apart(key: str, base: Design, design: Design) -> str:
-    """What sets a figure apart from the base's: an axis with other units or loads, another command."""
+def apart(key: str, base: Design, design: Design) -> str:
+    """What sets a figure apart from the base's: another axis (" linear"), with its units, or command."""
     group, _, rest = key.partition(".")
     quantity, _, load = rest.partition("@")
     own, its = ((one.axis, one.controller.outermost) for one in (design, base))
@@ -175,17 +168,14 @@ class Contribution:
 class Found:
     """What is found of one design of a comparison: plain data, kept on disk as they are."""
 
-    # By column, such as ``"position.phase_margin"``; ``None`` where there is none
-    figures: dict[str, float | None]
+    figures: dict[str, float | None]  # by column, such as ``"position.phase_margin"``
     verdicts: tuple[RequirementVerdict, ...]
     unstable: tuple[str, ...] = ()  # the loops that are not stable: they have no figures
     changed: tuple[Changed, ...] = ()
     differences: dict[str, float] = field(default_factory=dict)  # figure minus the base's, where they differ
-    # For each difference the changed keys one at a time, the strongest first; what is left over is their
-    # interaction (or a key without a number)
+    # Of each difference what each changed key does alone, the strongest first; the rest is interaction
     moved_by: dict[str, tuple[Contribution, ...]] = field(default_factory=dict)
-    # Of the validator: each prediction beside what the simulator shows; empty where not asked for
-    checks: tuple[Row, ...] = ()
+    checks: tuple[Row, ...] = ()  # of the validator; empty where not asked for
     untested: str = ""  # why the validator could not test this design
 
 

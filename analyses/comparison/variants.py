@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from math import isfinite, nan
 from os import PathLike
@@ -20,17 +20,8 @@ from actuator_lti.errors import InputError, NumericalError
 from actuator_lti.files.reading import as_path
 from actuator_lti.loops import assemble_loops
 from actuator_lti.types import Progress
-from analyses.comparison.found import (
-    Changed,
-    Contribution,
-    FigureName,
-    Found,
-    Kept,
-    LargeSignal,
-    beside,
-    figure_names,
-    small_signal,
-)
+from analyses.comparison import found
+from analyses.comparison.found import Changed, Contribution, FigureName, Found, Kept, LargeSignal
 from analyses.linear.loop_figures import LoopFigures, all_loop_figures
 from analyses.specification.requirements import evaluate_requirements, tally
 from analyses.specification.sensitivity import Sensitivities, moved, population_figures, sensitivities
@@ -147,11 +138,11 @@ def compare(
     work = partial(_beside, base, origin, plan, tested)
     (engine or Engine(threads=1)).map(work, missing, take, lambda done, _: tell(first + done, total))
     reference, *ends = (
-        Compared(variant=variant, **{part.name: getattr(one, part.name) for part in fields(Found)})
+        Compared(variant=variant, **vars(one))
         for variant, one in zip((study.base, *good), (base, *result), strict=True)
         if one is not None
     )
-    names = figure_names((c.figures, _design(c.variant)) for c in (reference, *ends))
+    names = found.figure_names((c.figures, _design(c.variant)) for c in (reference, *ends))
     refused = tuple(v for v in study.variants if v.design is None)
     return Comparison(study, names, reference, tuple(ends), slopes, refused)
 
@@ -171,7 +162,7 @@ def _evaluated(variant: Variant, plan: LargeSignal, tested: bool) -> Found:
         except (InputError, NumericalError) as error:
             untested = str(error)
     return Found(
-        figures={**small_signal(design, result), **plan.figures(design, loops)},
+        figures={**found.small_signal(design, result), **plan.figures(design, loops)},
         verdicts=evaluate_requirements(design, result),
         unstable=tuple(name for name, one in result.items() if one.sound is False),
         checks=checks,
@@ -182,7 +173,8 @@ def _evaluated(variant: Variant, plan: LargeSignal, tested: bool) -> Found:
 def _beside(base: Found, origin: Design, plan: LargeSignal, tested: bool, at: tuple[int, Variant]) -> Found:
     """What is found of a design, how it differs from the base, and what moved it."""
     one, design = _evaluated(at[1], plan, tested), _design(at[1])
-    one = replace(one, figures=beside(origin, design, one.figures))
+    own = {key + found.apart(key, origin, design): value for key, value in one.figures.items()}
+    one = replace(one, figures=own)
     changed, differences = changes(origin, design), {}
     for key, value in one.figures.items():
         before = base.figures.get(key)

@@ -11,19 +11,14 @@ from actuator_lti.asked.verdict import Tally, Verdict
 from actuator_lti.design.access import with_values
 from actuator_lti.design.checks import contradictions
 from actuator_lti.design.loader import AnyDesign, as_design
-from actuator_lti.design.model import Design, Requirement, Temperature, Tolerance
+from actuator_lti.design.model import Design, Requirement, Temperature
 from actuator_lti.design.tolerances import drawn, together
 from actuator_lti.errors import InputError
 from actuator_lti.loops import assemble_loops
 from actuator_lti.types import Progress
 from analyses.corners.asked import Asked
 from analyses.linear.loop_figures import LoopFigures, all_loop_figures
-from analyses.specification.requirements import (
-    RequirementVerdict,
-    judged,
-    judged_nominally,
-    tally,
-)
+from analyses.specification.requirements import RequirementVerdict, judged, judged_nominally, tally
 from analyses.specification.sensitivity import moved, population_loop_figures
 from analyses.studies.sampling import Factor
 
@@ -37,8 +32,7 @@ class Corner:
     design: Design
     figures: Mapping[str, LoopFigures]  # of its sampled, sliding loops
     verdicts: tuple[RequirementVerdict, ...]
-    # Keys whose values there contradict others, with why
-    refused: Mapping[str, str] = field(default_factory=dict)
+    refused: Mapping[str, str] = field(default_factory=dict)  # keys that contradict others there
 
     @property
     def tally(self) -> Tally:
@@ -59,9 +53,7 @@ class Corners:
     design: Design
     asked: Asked
     corners: tuple[Corner, ...]
-    # Requirements on what only an analysis of one design finds: not met where the nominal design fails, or
-    # else not proven
-    left_out: tuple[RequirementVerdict, ...] = ()
+    left_out: tuple[RequirementVerdict, ...] = ()  # of analyses: not met by the nominal design, or not proven
     over_all: tuple[RequirementVerdict, ...] = ()  # requirements on the worst of all corners
 
     @property
@@ -91,12 +83,12 @@ def corners(design: AnyDesign, asked: Asked | None = None, *, progress: Progress
     design = as_design(design)
     asked = Asked.of(design) if asked is None else asked
     kept = tuple(one for one in design.requirements if one.quantity not in ANALYSIS_QUANTITIES)
-    made = []
+    made, not_here = [], lambda name: (None, f"{name} is not judged at corners")
     for name, words, there in _made(design, asked):
         refused = {key: f"{key} = {value}: {why}" for key, value, why in contradictions(there)}
         there = replace(there, requirements=kept)
         figures = all_loop_figures(assemble_loops(there))
-        verdicts = tuple(verdict for one in kept for verdict in judged(there, one, figures, _not_here))
+        verdicts = tuple(verdict for one in kept for verdict in judged(there, one, figures, not_here))
         made.append(Corner(name, words, there, figures, verdicts, refused))
     over_all, left = list[RequirementVerdict](), list[Requirement]()
     for one in design.requirements:
@@ -110,10 +102,7 @@ def corners(design: AnyDesign, asked: Asked | None = None, *, progress: Progress
 
 
 def worst_of(corners: Iterable[Corner], name: str) -> float:
-    """A figure at the corners (of `ANALYSIS_QUANTITIES`): the worst over loops and corners.
-
-    -inf (or inf) where a loop is not stable.
-    """
+    """One of `ANALYSIS_QUANTITIES`: the worst over loops and corners; infinitely bad if one is unstable."""
     known = {one.name: QUANTITIES[figure] for figure, one in CORNERED.items()}
     if name not in known:
         raise InputError(f"quantity {name!r}: one of {', '.join(known)}")
@@ -124,10 +113,6 @@ def worst_of(corners: Iterable[Corner], name: str) -> float:
     found = (quantity.read(one) for one in loops)
     worst = min((quantity.better * value for value in found if value is not None), default=inf)
     return quantity.better * worst
-
-
-def _not_here(name: str) -> tuple[None, str]:
-    return None, f"{name} is not judged at corners"
 
 
 def _made(design: Design, asked: Asked) -> Iterator[tuple[str, str, Design]]:
@@ -176,12 +161,9 @@ def _thickened(design: Design, factor: float) -> Design:
 
 
 def worst_ends(design: Design, quantity: str) -> dict[str, float]:
-    """For each toleranced number the end of its range that alone worsens a figure most, over all loops.
-
-    One at a time, the worst over the loops counts; a number that worsens it at neither end stays. Torque
-    and back-EMF constant are one constant and go together.
-    """
-    ends = [end for each in drawn(design) for end in _ends(design, *each)]
+    """For each toleranced number the end of its range that alone worsens a figure, over all loops, most."""
+    boxes = ((each[0], Factor(*each).box) for each in drawn(design))
+    ends = [together(design, {path: float(end)}) for path, box in boxes for end in box]
     base = {path: float(design.parameters[path].value) for end in ends for path in end}
     try:
         figures = population_loop_figures(moved(design, base, ends), design)
@@ -198,8 +180,3 @@ def worst_ends(design: Design, quantity: str) -> dict[str, float]:
         if margin[1 + low] < margin[0]:
             chosen |= ends[low]
     return chosen
-
-
-def _ends(design: Design, path: str, nominal: float, tolerance: Tolerance) -> list[dict[str, float]]:
-    """Both ends of a range, each with what goes with it."""
-    return [together(design, {path: float(end)}) for end in Factor(path, nominal, tolerance).box]

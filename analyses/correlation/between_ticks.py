@@ -7,7 +7,9 @@ from collections.abc import Mapping
 import numpy as np
 
 from actuator_lti.design.model import Design
+from actuator_lti.drive.plant import motor_plant
 from actuator_lti.drive.steady import motor_torque_Nm
+from actuator_lti.systems.sampling import held_step, split_delay
 from actuator_lti.types import Floats, Ints
 from nonlinear import Trajectory
 
@@ -32,11 +34,8 @@ def signals_at(
         *made, voltage = (np.interp(time_s, run.time_s, one) for one in (*columns, run.voltage_V))
     else:
         (tick, late), (at, _) = (_placed(run, time_s + more) for more in (later_s, 0.0))
-        after, share, voltage = (
-            np.minimum(tick + 1, len(run.time_s) - 1),
-            late / run.period_s,
-            run.voltage_V[at],
-        )
+        after, share = np.minimum(tick + 1, len(run.time_s) - 1), late / run.period_s
+        voltage = run.voltage_V[at]
         made = [one[tick] + share * (one[after] - one[tick]) for one in columns]
         if np.any(late):
             bent = _bent(design, run, tick, late)
@@ -101,36 +100,31 @@ def _placed(run: Trajectory, time_s: Floats) -> tuple[Ints, Floats]:
 def _bent(design: Design, run: Trajectory, tick: Ints, late_s: Floats) -> Floats:
     """By how much angle, speed and current are off the straight lines between their ticks, shape (3, n).
 
-    Equations (1), (2) and (14) with the voltage in two pieces, and over the tick a torque with which the
-    speed arrives where it is at the next one.
+    By the plant of the linear loops (`motor_plant`), its voltage in two pieces, and over the tick a torque
+    with which the speed arrives where it is at the next one: coupling, load and friction are in that.
     """
-    motor, T = design.effective_motor, run.period_s
-    R, L, kM = motor.resistance_ohm, motor.inductance_H, motor.torque_constant_Nm_A
-    if not (R and L and kM) or motor.source_gain_Nm_V is not None:
+    if design.effective_motor.source_gain_Nm_V is not None:
         return np.zeros((3, len(tick)))
-    kE = kM if motor.back_emf_constant_Vs_rad is None else motor.back_emf_constant_Vs_rad
-    J = design.motor_side_inertia_kgm2 if design.coupling is not None else design.inertia_kgm2
-    rates, modes = np.linalg.eig(np.array([[-R / L, -kE / L], [kM / J, 0.0]], dtype=np.complex128))
-    into = np.linalg.inv(modes)
-    queue, split = divmod(design.controller.computing_delay_s, T)
-
-    def moved(from_tick: Floats, until: Floats) -> Floats:
-        """Current, speed and angle turned, from the first two at the tick, two voltages and a torque."""
-        state, area = into @ from_tick[:2], np.zeros(1)
-        spans = np.minimum(until, split), np.maximum(until - split, 0.0)
-        for volts, span in zip(from_tick[2:4], spans, strict=True):
-            push = into @ np.stack([volts / L, from_tick[4] / J])
-            grown = np.expm1(rates[:, None] * span) / rates[:, None]
-            area = area + grown * state + (grown - span) / rates[:, None] * push
-            state = state + grown * (rates[:, None] * state + push)
-        return np.asarray(np.vstack([modes @ state, (modes @ area)[1]]).real)
-
+    plant, T, u = motor_plant(design), run.period_s, run.voltage_V
+    A, B = plant.A[:3, :3], np.column_stack([plant.B_u, plant.B_T])[:3]
+    whole, part = split_delay(design.controller.computing_delay_s, T)
     tick = np.minimum(tick, len(run.time_s) - 2)
-    after, u = np.maximum(tick - int(queue), 0), run.voltage_V
+    volts = u[np.maximum(tick - whole - 1, 0)], u[np.maximum(tick - whole, 0)]
     columns = np.array([run.current_A, run.motor_speed_rad_s, run.motor_angle_rad])
-    begun = np.vstack([columns[:2, tick], u[np.maximum(after - 1, 0)], u[after]])
-    arrives = moved(np.eye(5), np.full(5, T))[1]
-    torque = (columns[1, tick + 1] - arrives[:4] @ begun) / arrives[4]
-    bent = moved(np.vstack([begun, torque]), late_s) - late_s / T * (columns[:, tick + 1] - columns[:, tick])
-    bent[:2] -= begun[:2]
+    begun, ends = columns[:, tick], columns[:, tick + 1]
+    rates, modes = np.linalg.eig(A.astype(np.complex128))
+    into = np.linalg.inv(modes)
+
+    def moved(torque: Floats, until_s: Floats) -> Floats:
+        """By how much current, speed and angle move until some time after each tick."""
+        first, state = np.minimum(until_s, part * T), into @ begun
+        moved = 0.0 * state
+        for held, span in zip(volts, (first, until_s - first), strict=True):
+            turn = rates[:, None] * span
+            grown = span * np.divide(np.expm1(turn), turn, out=np.ones_like(turn), where=turn != 0.0)
+            moved = moved + grown * (rates[:, None] * (state + moved) + into @ B @ np.stack([held, torque]))
+        return np.asarray((modes @ moved).real)
+
+    short = ends[1] - begun[1] - moved(np.zeros(len(tick)), np.full(1, T))[1]
+    bent = moved(short / held_step(A, B, T)[1][1, 1], late_s) - late_s / T * (ends - begun)
     return np.asarray(bent[::-1])

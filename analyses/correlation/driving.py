@@ -76,18 +76,18 @@ def readings(driven: Driven, record: Record) -> list[Driven]:
 
     Jumps in neighbouring rows are a curve or steps; a curve is smooth, or the drive takes it in straight
     lines or, as from a field bus, held until the next sample. Where the rows tell a grid on which it jumps,
-    it is held, and each jump on the grid or, as of a sender that is not punctual, anywhere before its row.
+    it is held, and each jump on the grid or, of a sender that is not punctual, at any tick before its row.
     """
-    early = record.early_s
+    early, coarse = record.early_s, record.period_s > 1.5 * driven.design.controller.period_s
     held = replace(driven, together=len(record), between=HELD)
     if (on_grid := _on_grid(held, record)) is not None:
-        found = [on_grid, held]
+        found = [on_grid, held] if coarse else [on_grid]
         if early is None:
             return found
         found = [replace(one, early_s=early[on_grid.steps]) for one in found]
-        return found[:1] if on_grid.hold and on_grid.hold.holds(found[0].likely_s) else found[1:]
+        return found[:1] if on_grid.hold and on_grid.hold.holds(found[0].likely_s) else found[-1:]
     found = [driven, replace(driven, together=MOST_TOGETHER)]
-    if record.period_s > 1.5 * driven.design.controller.period_s:
+    if coarse:
         found += [held, replace(driven, together=0, between=STRAIGHT)]
     other = [one for k, one in enumerate(found) if not k or len(one.steps) != len(found[k - 1].steps)]
     if early is not None:
@@ -163,7 +163,6 @@ def at_ticks(driven: Driven, time_s: Floats, duration_s: float, early_s: Floats)
     still is a step of the command, and comes ``early_s`` (one for each) before the later sample.
     """
     period = driven.design.controller.period_s
-    curve = _lines if driven.between == STRAIGHT else _smooth
     ticks = np.asarray(np.arange(round(duration_s / period) + 1) * period, dtype=np.float64)
     values = np.empty_like(ticks)
     later = driven.steps
@@ -174,12 +173,9 @@ def at_ticks(driven: Driven, time_s: Floats, duration_s: float, early_s: Floats)
         return ticks, np.repeat(driven.values[starts], np.diff(edges, append=len(ticks)))
     for start, end, first, last in zip(starts, ends, edges, [*edges[1:], len(ticks)], strict=True):
         part = slice(start, end)
-        values[first:last] = curve(time_s[part], driven.values[part], ticks[first:last])
+        points, at = (time_s[part], driven.values[part]), ticks[first:last]
+        values[first:last] = np.interp(at, *points) if driven.between == STRAIGHT else _smooth(*points, at)
     return ticks, values
-
-
-def _lines(time_s: Floats, values: Floats, at_s: Floats) -> Floats:
-    return np.interp(at_s, time_s, values)
 
 
 def _smooth(time_s: Floats, values: Floats, at_s: Floats) -> Floats:
@@ -281,14 +277,12 @@ def first_states(driven: Driven, record: Record, measured: Mapping[str, Floats])
             values = measured[name]
             early = float(np.median(values[:FIRST_ROWS]))
             speed = factor * early if abs(early) > IN_MOTION * float(np.max(np.abs(values))) else 0.0
-    values = record.signals.get("current", np.zeros(1))
-    current = float(np.median(values[:FIRST_ROWS]))
+    values, ideal = record.signals.get("current", np.zeros(1)), motor.source_gain_Nm_V is not None
     holds = float(np.median(np.abs(values[:FIRST_ROWS]))) > 0.1 * float(np.max(np.abs(values)))
-    if motor.source_gain_Nm_V is not None or (speed == 0.0 and not holds):
-        current = 0.0
+    current = float(np.median(values[:FIRST_ROWS])) if not ideal and (speed or holds) else 0.0
     if speed == 0.0 and current == 0.0:
         return rest, rest
-    volts = 0.0 if motor.source_gain_Nm_V is not None else steady_voltage_V(design, current, speed)
+    volts = 0.0 if ideal else steady_voltage_V(design, current, speed)
     cascaded = design.controller.current is not None
     first = float(driven.values[0])
     return rest, replace(

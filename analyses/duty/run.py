@@ -37,8 +37,7 @@ class Heating:
     final_degC: float  # in the long run, the resistance growing with the temperature; inf: it never settles
     limit_degC: float
     limit_after_s: float | None  # when the limit is reached from ambient; None: never
-    # The rise from ambient, for drawing
-    time_s: Floats
+    time_s: Floats  # the rise from ambient, for drawing
     temperature_degC: Floats
 
 
@@ -48,22 +47,18 @@ class Duty:
 
     design: Design
     asked: Asked
-    # Current: of the whole cycle, in motion, at rest, largest; both steady
-    rms_A: float
+    rms_A: float  # current of the whole cycle, in motion, at rest, largest; both steady
     moving_rms_A: float
     holding_A: float
     peak_A: float
     continuous_A: float  # what the design allows for ever; inf where it states none
     limited: tuple[str, ...]  # limiters that act in steady motion: the duty is then not followed as asked
     shaft_W: float  # mean over the cycle of what the motor gives its shaft
-    # Largest from the supply into the winding and back, of copper and shaft; in motion
-    peak_power_W: float
+    peak_power_W: float  # largest from the supply into the winding, and back: copper and shaft
     fed_back_W: float
-    # One period of the steady motion, or several where the load turns with the drive
-    time_s: Floats
+    time_s: Floats  # one period of the steady motion, or several where the load turns with it
     current_A: Floats
-    # None without overload protection, without a thermal resistance in the design
-    overload: Overload | None
+    overload: Overload | None  # none without protection; none without a thermal resistance
     heating: Heating | None
 
     @property

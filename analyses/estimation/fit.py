@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from typing import Self
 
 import numpy as np
 
@@ -119,6 +120,26 @@ class Fit:
         values[here] = own.values
         covariance[np.ix_(here, here)] = own.covariance + beside @ inverse @ beside.T
         return replace(self, values=values, covariance=covariance)
+
+    def wider(self, moved: Floats) -> Self:
+        """The fit with what an error moves all its values by, once its standard deviation."""
+        return replace(self, covariance=self.covariance + np.outer(moved, moved))
+
+    def joined(self, other: Fit, beside: Floats) -> Fit:
+        """The values of both; ``beside``: their covariance, shape (p, those of the other)."""
+        return Fit(
+            names=(*self.names, *other.names),
+            values=np.concatenate([self.values, other.values]),
+            covariance=np.block([[self.covariance, beside], [beside.T, other.covariance]]),
+        )
+
+    def at(self, given: Mapping[str, float]) -> Fit:
+        """The other values as they are expected where some are known to be these (conditional mean)."""
+        rest = [k for k, name in enumerate(self.names) if name not in given]
+        gone, c = [self.names.index(name) for name in given], self.covariance
+        off = np.array(list(given.values())) - self.values[gone]
+        values = self.values[rest] + c[np.ix_(rest, gone)] @ np.linalg.lstsq(c[np.ix_(gone, gone)], off)[0]
+        return Fit(names=tuple(self.names[k] for k in rest), values=values, covariance=c[np.ix_(rest, rest)])
 
     def renamed(self, names: Mapping[str, str]) -> Fit:
         """The values that have a new name, under it, and their covariance."""

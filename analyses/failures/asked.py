@@ -79,11 +79,7 @@ class Asked:
 
     @classmethod
     def of(cls, design: Design, **chosen: float | None) -> Asked:
-        """What is chosen; the rest from [failure] of the design; else its full deflection is the stop.
-
-        A drive without a position loop turns on: unless one is stated, its stop is infinitely far. A speed
-        drive turns at half its top speed.
-        """
+        """What is chosen, else [failure] of the design; else its full deflection is the stop, if any."""
         from analyses.large_signal.tones import full_command
 
         stated = vars(design.failure) if design.failure is not None else {}

@@ -135,8 +135,7 @@ class Case:
     command: Course  # command over the time from the failure on (from the step on, where ``at_rad`` is given)
     broken: Callable[[Rig], None] = lambda _: None  # what is done to the rig
     start: float = 0.0  # command that the drive follows before
-    # The failure happens on the way, when the output is this far from the start; ``None``: at once
-    at_rad: float | None = None
+    at_rad: float | None = None  # when the output is this far from the start; ``None``: at once
     stops: bool = True  # whether the run ends at the stop
 
 
@@ -266,9 +265,8 @@ def _sense(rig: Rig, *, zero: bool = False) -> None:
 def _sines(design: Design, size: float) -> Iterator[tuple[float, str]]:
     """Frequencies in Hz at which the output may follow a sine of the command most, and in words which.
 
-    Resonance and bandwidth of the response to the command, as `margins` has them, of a drive that turns
-    without what passes; where the profile of the command cuts a sine of the size there, the highest that it
-    lets pass. Of a torque the resonance of motor and load.
+    Resonance and bandwidth as `margins` has them, of what turns without what passes; or the highest that the
+    profile lets pass. Of a torque the resonance of motor and load.
     """
     stage = design.controller.outermost
     if stage == "current":

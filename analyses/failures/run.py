@@ -34,12 +34,10 @@ class FailureCase:
     speed_rad_s: Floats
     current_A: Floats
     moment_Nm: Floats
-    # To the deflection asked for and to the stop, either side; ``None``: not reached while watched
-    to_deflection_s: float | None
+    to_deflection_s: float | None  # either side, as the stop; ``None``: not reached while watched
     to_stop_s: float | None
     at_detection_rad: float  # largest deflection until the failure is detected
-    # Largest magnitudes
-    peak_speed_rad_s: float
+    peak_speed_rad_s: float  # largest magnitudes
     peak_current_A: float
     peak_moment_Nm: float
     protected_s: float | None  # when the overload protection (I2t) acts first
@@ -222,9 +220,7 @@ def _reaches(rig: Rig, case: Case) -> bool:
 
 def _first(t: Floats, size: Floats, level: float) -> float | None:
     """Time at which a level is first crossed, on a line between two ticks."""
-    there = np.flatnonzero(size >= level)
-    if not there.size:
+    if size.max() < level:
         return None
-    if (k := int(there[0])) == 0:
-        return float(t[0])
-    return float(t[k] - (t[k] - t[k - 1]) * (size[k] - level) / (size[k] - size[k - 1]))
+    k = int(np.argmax(size >= level))
+    return float(np.interp(level, size[k - 1 : k + 1], t[k - 1 : k + 1])) if k else float(t[0])

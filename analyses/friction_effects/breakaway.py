@@ -1,7 +1,4 @@
-"""At rest: the smallest command that moves the output, and what a slow one loses at a reversal.
-
-Both by the gains of the controllers, and simulated.
-"""
+"""At rest: the smallest command that moves the output, what a slow reversal loses; told and simulated."""
 
 import math
 from dataclasses import dataclass, replace
@@ -26,13 +23,10 @@ class StaticThreshold:
 
     load_Nm: float
     torque_gain_Nm_rad: float  # motor torque per output position error, before an integrator has acted
-    # Command (peak, output side) that overcomes breakaway in each direction; 0 where the load already does,
-    # ``inf`` where the drive is not strong enough
+    # Command (peak, output side) that overcomes breakaway; 0 where the load does, ``inf``: too weak
     forward_rad: float
     backward_rad: float
-    # Integral time of the velocity controller, else of the position controller: with one any smaller command
-    # moves the output later, see `waiting_time_s`; ``None`` where nothing integrates and the threshold is
-    # final
+    # Of the velocity controller, else the position controller; ``None``: the threshold is final
     integral_time_s: float | None
     outer_integral_time_s: float | None = None  # of the position controller, beside the other
 
@@ -98,16 +92,12 @@ class Threshold:
 
 
 def threshold(design: Design, load_Nm: float) -> Threshold | None:
-    """Simulate steps around the threshold; ``None`` where a forward step has none (or never moves).
-
-    Steps as they come behind profile and filter of the command, which let none through as it is. It is the
-    motor that starts, from angle zero: what dry friction holds behind a spring follows later.
-    """
+    """Simulate steps about the threshold of the motor, behind the profile; ``None``: none forward."""
     design = replace(design, command=Command())
     friction = design.friction
     at_zero = replace(  # its own torque there an offset, no friction behind the spring
         design,
-        motor=design.motor.level(),
+        motor=design.motor.straight(),
         load=replace(design.load.level(), friction=None),
         friction=replace(friction, offset_torque_Nm=friction.offset_torque_Nm + holding_torque_Nm(design)),
     )
@@ -128,10 +118,7 @@ def threshold(design: Design, load_Nm: float) -> Threshold | None:
 
 
 def _first_motion_s(design: Design, load_Nm: float, sizes: np.ndarray) -> np.ndarray:
-    """First time at which each step moves the motor; ``inf`` if none does. A spring carries the load already.
-
-    The sensor that the position loop has stands at zero.
-    """
+    """When each step first moves the motor, spring loaded, the sensor at zero; ``inf`` if none does."""
     rows = Rows.of(design, len(sizes))
     rows["load"] = load_Nm
     rows.step("command", sizes)
@@ -162,9 +149,7 @@ class Hysteresis:
     output_rad: np.ndarray
     width_rad: float  # output falling less output rising, both where the command passes zero
     linear_width_rad: float  # the same without dry friction and play: what the loop lags by at this rate
-    # Largest distance of the output from what it would be without dry friction and play, at any update of the
-    # position loop in the period
-    largest_rad: float
+    largest_rad: float  # distance of the output from that without dry friction and play, at any update
     predicted_rad: float  # what a reversal loses of a slow command: `lost_predicted_rad`
 
     @property
@@ -203,10 +188,9 @@ def hysteresis(design: Design, load_Nm: float, static: StaticThreshold, settling
 def lost_predicted_rad(design: Design, load_Nm: float, static: StaticThreshold, rate_rad_s: float) -> float:
     """What dry friction and play lose at a reversal of a slow command, where the command passes zero.
 
-    On each branch the drive slides.  Where nothing integrates, the torque that sliding takes needs an error,
-    torque over stiffness; one integral of time T needs ``T dT_f/dt`` over the stiffness where friction grows
-    with a load that bends over the angle, two need none.  A spring in front of the output lags by its twist,
-    and by half its play, unless the position loop sees the output itself.
+    Where nothing integrates, the torque of sliding needs an error, over the stiffness; one integral of time T
+    needs ``T dT_f/dt`` where friction grows with a load that bends over the angle, two none. A spring lags by
+    its twist and half its play, unless the position loop sees the output itself.
     """
     branches = (_lag_rad(design, load_Nm, static, way * rate_rad_s) for way in (1.0, -1.0))
     return next(branches) - next(branches)

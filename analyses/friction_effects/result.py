@@ -62,10 +62,8 @@ def limit_cycles(
 ) -> LimitCycles:  # fmt: skip
     """Predict limit cycles, look for them in the simulator, and wait what steps end in.
 
-    The steps are those that judge the whole drive, without counts and noise (`analyses.motion.settling`).
-
-    What is known already may be given: cycles ``predicted`` by describing function, the sampled sliding
-    loops, and what steps of the drive as it is end in, of which those at rest are not asked again.
+    Without counts and noise (`analyses.motion.settling`). Known already: ``predicted`` cycles, sampled
+    sliding ``loops``, ``settlings`` of the drive as it is, of which those at rest are not asked again.
     """
     given, design = design, quiet(design)
     alike = np.array_equal(Rows.of(given).values, Rows.of(design).values)

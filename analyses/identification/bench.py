@@ -23,10 +23,10 @@ from analyses.identification.design_values import (
     with_given_constant,
 )
 from analyses.identification.diagnosis import Diagnosed, without_flat_tops
-from analyses.identification.electrical import ElectricalFit, electrical_slopes, electrical_values
+from analyses.identification.electrical import ElectricalFit
 from analyses.identification.inverse import held_out_residual
 from analyses.identification.joint_model import JointModel, LawChoice
-from analyses.identification.motor_and_motion import by_voltage, held_values, motor_and_motion, names_of
+from analyses.identification.motor_and_motion import Sought, names_of
 from analyses.identification.output_error import OutputErrorResult, Resimulated, refine_records, resimulate
 from analyses.identification.residuals import ResidualTest, residual_tests
 from analyses.identification.rows import is_loaded, recipe_for, stands
@@ -82,37 +82,44 @@ def identify_bench(
     plain = with_values(design, fixed_values(design, settings.fix))
     usual = settings.cutoff_hz is None and settings.decimation is None
     recipe = None if usual else recipe_for(used[0], settings.cutoff_hz, settings.decimation)
+    sought = Sought(design, plain, settings, recipe)
     findings = {record.name: check_record(plain, record) for record in (*used, *unseen)}
     with because(findings):
         used, unseen = (tuple(switched_off(plain, one) for one in these) for these in (used, unseen))
         if settings.electrical:
-            judged = _judged(plain, by_voltage(plain, used, recipe)[0])
+            judged = _judged(plain, sought.by_voltage(used)[0])
             findings = {record.name: check_record(judged, record) for record in (*used, *unseen)}
         if all(stands(plain, record, recipe) for record in used):
             still = "no motion beyond noise: inertia and friction take a record that moves"
             raise InputError(f"{still}; of a motor held fast --electrical tells R and L", names_of(used))
     with because(findings):
-        found = motor_and_motion(design, plain, used, settings, recipe)
-    if HELD in {record.between for record in found.right.records}:
-        judged = _judged(plain, found.start) if settings.electrical else plain
-        findings = {
-            record.name: check_record(judged, replace(record, between=HELD)) for record in (*used, *unseen)
-        }
+        found = sought.motor_and_motion(used)
     start, electrical, right = found.start, found.electrical, found.right
-    held = held_values(design, start, settings)
+    if HELD in {record.between for record in right.records}:
+        judged = _judged(plain, start) if settings.electrical else plain
+        held = (replace(record, between=HELD) for record in (*used, *unseen))
+        findings = {record.name: check_record(judged, record) for record in held}
     compared = design_values(design, right.model, right.records, start)
-    model, both = _with_constant(start, right, compared, electrical)
+    if electrical is None:
+        model, both = with_given_constant(start, right.model, right.records, compared), None
+    else:
+        model, both = with_found_constant(start, right.model, right.records, electrical)
     whole = [without_flat_tops(start, record, recipe) for record in unseen]
     told = {**right.findings, **{record.name: tuple(clipped) for record, clipped in whole}}
     findings = {name: (*each, *told[name]) for name, each in findings.items()}
     right, unseen = replace(right, model=model), tuple(record for record, _ in whole)
     tests = residual_tests(model)
-    items = list(_items(design, settings, findings, right, compared, held, tests))
+    items = list(_items(sought, findings, right, compared, tests))
     made, refined, unmade = _made(start, right, both, settings, items, progress)
     every = () if unmade else (*right.records, *unseen)
     again = tuple(resimulate(made, record, model.form) for record in every)
     items += verdict.made_items(unmade, design, made)
-    items += _unseen_items(start, model, unseen, limit)
+    allowed = min(HELD_OUT_FACTOR * model.relative_residual + HELD_OUT_EXTRA, limit)
+    for record in unseen:
+        if not runs_down(start, record):  # others have no torque
+            label = f"Relative residual of {record.name}, not seen by the fit"
+            residual, why = held_out_residual(start, model, record), "the fit does not carry over to it"
+            items.append(verdict.share_item(f"held-out-{record.name}", label, residual, allowed, why))
     items += [verdict.simulated_item(one.record, one.beyond_noise, limit, one.how) for one in again]
     return BenchResult(
         records=right.records,
@@ -143,25 +150,6 @@ def _judged(plain: Design, start: Design) -> Design:
         motor = replace(motor, back_emf_constant_Vs_rad=own)
     motor = replace(motor, resistance_ohm=plain.motor.resistance_ohm)
     return replace(start, motor=motor, parameters=FrozenMap(parameters))
-
-
-def _with_constant(
-    start: Design, right: Diagnosed, compared: Sequence[DesignValue], electrical: ElectricalFit | None
-) -> tuple[JointModel, Fit | None]:
-    """The model with the error of the constant that makes torques, and the fit of both where it was found."""
-    if electrical is None:
-        return with_given_constant(start, right.model, right.records, compared), None
-    if electrical.with_motion is not None:
-        return right.model, _both(start, right.model, electrical)
-    return with_found_constant(start, right.model, right.records, electrical_values(start, electrical))
-
-
-def _both(start: Design, model: JointModel, motor: ElectricalFit) -> Fit:
-    """Motion and motor that were found together, the motor by the keys of a design."""
-    values, beside = np.concatenate([model.values, motor.values]), np.asarray(motor.with_motion)
-    covariance = np.block([[model.covariance, beside], [beside.T, motor.covariance]])
-    both = Fit(names=(*model.names, *motor.names), values=values, covariance=covariance)
-    return both.mapped({name: {name: 1.0} for name in model.names} | electrical_slopes(start, motor))
 
 
 def _made(
@@ -205,16 +193,14 @@ def _made(
 
 
 def _items(
-    design: Design,
-    settings: Settings,
+    sought: Sought,
     findings: Mapping[str, tuple[Finding, ...]],
     right: Diagnosed,
     compared: Sequence[DesignValue],
-    held: Mapping[str, float],
     tests: Sequence[ResidualTest],
 ) -> Iterator[verdict.Item]:
     """What must hold before a design is made, and what is kept of the old one."""
-    model, records = right.model, right.records
+    model, records, design, settings = right.model, right.records, sought.design, sought.settings
     for name, result in findings.items():
         yield verdict.inputs_item(name, result)
     for name, one in right.followed.items():  # before what comes of it
@@ -230,19 +216,7 @@ def _items(
     yield from verdict.independence_items(tests)
     yield from verdict.noise_items(model)
     yield from verdict.offset_items(design, model)
-    yield from verdict.kept_items(model, held, design.axis)
+    yield from verdict.kept_items(model, sought.held, design.axis)
     yield from verdict.lag_items(right.late_s, max(record.period_s for record in records))
     for record in records:
         yield from verdict.sampling_items(record)
-
-
-def _unseen_items(
-    start: Design, model: JointModel, unseen: Sequence[Record], limit: float
-) -> Iterator[verdict.Item]:
-    """Whether the fit carries over to records that it has not seen."""
-    allowed = min(HELD_OUT_FACTOR * model.relative_residual + HELD_OUT_EXTRA, limit)
-    driven = [record for record in unseen if not runs_down(start, record)]  # others have no torque
-    for record in driven:
-        label = f"Relative residual of {record.name}, not seen by the fit"
-        residual, why = held_out_residual(start, model, record), "the fit does not carry over to it"
-        yield verdict.share_item(f"held-out-{record.name}", label, residual, allowed, why)

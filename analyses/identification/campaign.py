@@ -104,8 +104,7 @@ def identify_campaign(
         fit = fit_surface(points, tools, constant, outliers=outliers, fixed=fixed, kept=own)
     except InputError as error:
         told = "; ".join(f"{run.id}: {run.reason}" for run in aside[:3])
-        message = f"{error.message} ({told})" if told else error.message
-        raise InputError(message, campaign.origin) from None
+        raise InputError(error.message + f" ({told})" * bool(told), campaign.origin) from None
     gone = {run.id for run in aside}
     if lost := sum(run.id in gone and bool(run.load_Nm) for run in campaign.runs):
         none = "no run is loaded"
@@ -182,9 +181,16 @@ def campaign_items(
     names, before = ("dry", "viscous", "load_coefficient"), _values_of(design)
     found = fit.renamed(dict(zip(NAMES, names, strict=True)))
     compared = [design_value(design, found, names[k], before[NAMES[k]]) for k in fit.told]
+    items = []
+    if design.load.path != "self-locking" and any(point.load_Nm for point in fit.points):
+        reason = (
+            f'load.path = "{design.load.path}": the motor carries M/N as well, which the law C0 + Cv w + CM '
+            f"|M| lacks, so CM holds 1/N = {1e3 / design.total_ratio:.4g} mN m/(N m) beside the friction; "
+            'allowed: load.path = "self-locking", or records of a motion, whose model has M/N'
+        )
+        items.append(Item(id="law", label="The load only adds friction", passed=False, reason=reason))
     label = "Runs agree with their set speed and load, themselves and the design"
-    items = [
-        *_law_item(design, fit),
+    items += [
         Item(id="runs", label=label, passed=False if aside and aside[0].contradicts else passed, reason=why),
         size_item(design, [one for one in compared if one], kept_constants=False, loaded=True),
         residual_item(fit.relative_residual, limit),
@@ -193,18 +199,6 @@ def campaign_items(
     if simulated is not None:
         items.append(simulated_item("the runs", simulated, limit, "steady current, simulated"))
     return tuple(items)
-
-
-def _law_item(design: Design, fit: SurfaceFit) -> Iterator[Item]:
-    """What the law lacks of a drive that carries its load: M_ext over the reduction."""
-    if design.load.path == "self-locking" or not any(point.load_Nm for point in fit.points):
-        return
-    reason = (
-        f'load.path = "{design.load.path}": the motor carries M/N as well, which the law C0 + Cv w + CM |M| '
-        f"lacks, so CM holds 1/N = {1e3 / design.total_ratio:.4g} mN m/(N m) beside the friction; allowed: "
-        'load.path = "self-locking", or records of a motion, whose model has M/N'
-    )
-    yield Item(id="law", label="The load only adds friction", passed=False, reason=reason)
 
 
 def steady_error(design: Design, points: Sequence[SteadyPoint], *, progress: Progress = None) -> float | None:

@@ -18,7 +18,12 @@ from actuator_lti.errors import InputError
 from actuator_lti.types import Floats
 from analyses.estimation.fit import Fit, Fixed
 from analyses.estimation.parameters import default_value, own_share, own_std, parameter
-from analyses.identification.electrical import fit_electrical, without_own_bias
+from analyses.identification.electrical import (
+    ElectricalFit,
+    electrical_slopes,
+    fit_electrical,
+    without_own_bias,
+)
 from analyses.identification.joint_model import JointModel
 from analyses.identification.rows import drive_of, rows_under
 from analyses.records.consistency import NO_CHANCE, SURE, one_phase
@@ -43,7 +48,7 @@ CAUSES: Mapping[str, Mapping[str, float]] = {
 """What a factor in one of these does to the identified values: its powers."""
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class DesignValue:
     """One number of the design beside what the records say."""
 
@@ -115,15 +120,9 @@ def design_value(
     before, found = before + behind, fit[name] + behind
     if before <= 0.0 or found <= 0.0:
         return None
-    return DesignValue(
-        name=name,
-        design=before,
-        found=found,
-        ratio=found / before,
-        error=fit.std(name) / before,
-        allowed=own_share(design, parameter(name).key, before),
-        assumed=not own_std(design, parameter(name).key),
-    )
+    key, ratio, error = parameter(name).key, found / before, fit.std(name) / before
+    allowed = own_share(design, key, before)
+    return DesignValue(name, before, found, ratio, error, allowed, assumed=not own_std(design, key))
 
 
 def cause(values: Sequence[DesignValue]) -> tuple[str, float, float] | None:
@@ -235,8 +234,7 @@ def with_given_constant(
     for one in compared:
         if one.name == "back_emf" and name == "torque_constant" and one.error <= one.allowed:
             off = one.ratio - 1.0
-            moved = shares * float(np.hypot(off, one.error)) * model.values
-            model = replace(model, covariance=model.covariance + np.outer(moved, moved))
+            model = model.wider(shares * float(np.hypot(off, one.error)) * model.values)
             if abs(off) <= SURE * one.error:
                 return model
             words = (
@@ -248,23 +246,22 @@ def with_given_constant(
 
 
 def with_found_constant(
-    start: Design, model: JointModel, records: Sequence[Record], found: Fit
+    start: Design, model: JointModel, records: Sequence[Record], motor: ElectricalFit
 ) -> tuple[JointModel, Fit]:
-    """The model with the error of kM in its intervals, and its values beside those of the voltage equation.
+    """The model with the error of kM in its intervals, and its values beside the motor's, by a design's keys.
 
-    ``found`` has kM and what comes with it, by the keys of a design.
+    Where both were found together the model has that error.
     """
-    key, moves = parameter("torque_constant").key, np.zeros(len(model.names))
+    slopes = electrical_slopes(start, motor)
+    if motor.with_motion is not None:
+        return model, model.joined(motor, motor.with_motion).mapped(
+            {name: {name: 1.0} for name in model.names} | slopes
+        )
+    found, key, moves = motor.mapped(slopes), parameter("torque_constant").key, np.zeros(len(model.names))
     if {constant_of(start, record) for record in records} == {"torque_constant"}:
         moves = _shares(start, "torque_constant", model, records) * model.values / found[key]
-    beside = np.outer(moves, found.covariance[found.names.index(key)])
-    model = replace(model, covariance=model.covariance + found.std(key) ** 2 * np.outer(moves, moves))
-    both = Fit(
-        names=(*model.names, *found.names),
-        values=np.concatenate([model.values, found.values]),
-        covariance=np.block([[model.covariance, beside], [beside.T, found.covariance]]),
-    )
-    return model, both
+    model = model.wider(found.std(key) * moves)
+    return model, model.joined(found, np.outer(moves, found.covariance[found.names.index(key)]))
 
 
 def constant_of(design: Design, record: Record) -> str | None:

@@ -21,6 +21,7 @@ from analyses.records.consistency import ALIKE, SURE, Finding, clock_doubt, resi
 from analyses.records.naming import KNOWN_UNITS
 from analyses.records.record import Record, lasting
 
+Fitting = Callable[[Sequence[Record]], JointModel]
 LEAST_RUN = 3  # samples in a row at the largest or smallest value of all: a flat top
 ROUNDS = 8
 SETTLED = 0.1
@@ -57,11 +58,7 @@ class Diagnosed:
 
 
 def diagnosed(
-    design: Design,
-    start: Design,
-    records: Sequence[Record],
-    fit: Callable[[Sequence[Record]], JointModel],
-    recipe: Recipe | None,
+    design: Design, start: Design, records: Sequence[Record], fit: Fitting, recipe: Recipe | None
 ) -> Diagnosed:
     """Fit records, rows of clipped current left out and lags taken back where they are sure.
 
@@ -84,7 +81,7 @@ def diagnosed(
         before, model = model, fit(used)
         if before.names == model.names:
             share = np.mean([(lag.standard_error / lag.seconds) ** 2 for lag in sure])
-            model = _widened(model, np.sqrt(share) * (model.values - before.values))
+            model = model.wider(np.sqrt(share) * (model.values - before.values))
     pairs = zip(used, model.simulated, strict=False)  # none where it cannot be simulated
     seen = {record.name: _followed(start, record, like.signals) for record, like in pairs}
     for record, part in zip(used, model.records, strict=True):
@@ -95,7 +92,7 @@ def diagnosed(
             model = replace(model, covariance=model.covariance + added)
     bend = None if any(map(is_benchmark, used)) else bend_of(model)
     if bend is not None:
-        model = _widened(model, np.sqrt(1.0 - bend.chance) * bend.moved)
+        model = model.wider(np.sqrt(1.0 - bend.chance) * bend.moved)
     return Diagnosed(
         model=model,
         bend=bend,
@@ -116,11 +113,6 @@ def _followed(start: Design, record: Record, simulated: Mapping[str, Floats]) ->
     return followed(start, record, own)
 
 
-def _widened(model: JointModel, moved: Floats) -> JointModel:
-    """The model with what an error moves all its values by, once its standard deviation."""
-    return replace(model, covariance=model.covariance + np.outer(moved, moved))
-
-
 def _with_doubts(
     design: Design, start: Design, record: Record, follow: Followed | None, model: JointModel
 ) -> JointModel:
@@ -130,8 +122,8 @@ def _with_doubts(
         clock = max(clock, clock_doubt(start, record), key=abs)
     kinds = [name.partition("_")[0] for name in model.names]
     for share, powers in ((clock, {"inertia": 2.0, "viscous": 1.0}), (off, {"inertia": 1.0, "viscous": 1.0})):
-        model = _widened(model, share * np.array([powers.get(kind, 0.0) for kind in kinds]) * model.values)
-    return _widened(model, resistance_doubt(design, record) * model.values)
+        model = model.wider(share * np.array([powers.get(kind, 0.0) for kind in kinds]) * model.values)
+    return model.wider(resistance_doubt(design, record) * model.values)
 
 
 def _of_lag(signal: str, lag: Lag, period_s: float) -> Finding:
@@ -139,12 +131,10 @@ def _of_lag(signal: str, lag: Lag, period_s: float) -> Finding:
     late, error = 1e3 * lag.seconds, 1e3 * lag.standard_error
     if not lag.is_sure:
         told = lag.within_s <= period_s or None
-        return Finding(subject=subject, passed=told, text=f"within {max(abs(late), 2.0 * error):.2g} ms")
+        return Finding(subject, told, f"within {max(abs(late), 2.0 * error):.2g} ms")
     which = "later" if late > 0.0 else "earlier"
     text = f"the {signal} is {abs(late):.3g} ms (standard error {error:.1g} ms) {which} than the motion"
-    return Finding(
-        subject=subject, passed=None, text=f"{text}: taken back by as much before the fit", done="taken back"
-    )
+    return Finding(subject, None, f"{text}: taken back by as much before the fit", done="taken back")
 
 
 def _drift(part: RecordFit, model: JointModel, offset: Parameter) -> tuple[list[Finding], Floats]:
@@ -167,9 +157,7 @@ def _drift(part: RecordFit, model: JointModel, offset: Parameter) -> tuple[list[
         if "offset" in model.names:
             moved[model.names.index("offset"), model.names.index("offset")] += shift**2 / 3.0
     text = f"{' and '.join(told)}: the intervals hold it"
-    return [
-        Finding(subject="drift along the record", passed=None, text=text, done="widened")
-    ] if told else [], moved
+    return [Finding("drift along the record", None, text, done="widened")] * bool(told), moved
 
 
 def flat_tops(values: Floats) -> Mask:

@@ -61,14 +61,8 @@ def fit_electrical(
         told = f"a current {1e3 * late_s:.2g} ms late makes {of_lag:.2g} H of the {value:.2g} H found"
     rest = [name for name in whole.names if name != "inductance"]
     fit, others = whole.renamed({name: name for name in rest}), [whole.names.index(name) for name in rest]
-    return replace(
-        whole,
-        names=fit.names,
-        values=fit.values,
-        covariance=fit.covariance,
-        at_once=whole.at_once[others],
-        fixed={**whole.fixed, "inductance": kept_inductance(design, told)},
-    )
+    fixed = {**whole.fixed, "inductance": kept_inductance(design, told)}
+    return replace(whole, **{**vars(fit), "at_once": whole.at_once[others], "fixed": fixed})
 
 
 def kept_inductance(design: Design, told: str) -> Fixed:
@@ -127,11 +121,7 @@ def _columns(tables: Sequence[Floats], names: Sequence[str]) -> tuple[Floats, Fl
 
 
 def without_own_bias(
-    fit: ElectricalFit,
-    start: Design,
-    records: Sequence[Record],
-    model: JointModel,
-    recipe: Recipe | None = None,
+    fit: ElectricalFit, start: Design, records: Sequence[Record], model: JointModel, recipe: Recipe | None
 ) -> ElectricalFit:
     """The fit less what the same fit finds too much in records simulated with the motor of ``start``.
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from actuator_lti.design import read_design_text, write_design
+from actuator_lti.design import parameter_value, read_design_text, write_design
 from actuator_lti.design.model import Coupling, Design, LoadFriction
 from actuator_lti.errors import InputError, NumericalError
 from actuator_lti.types import Floats
@@ -189,14 +189,9 @@ def _held_at_zero(fit: TwoMass) -> TwoMass:
     below = [name for name in two_mass.FLOORS if name in fit.names and fit[name] < 0.0]
     if not below:
         return fit
-    gone = [fit.names.index(name) for name in below]
-    rest = fit.renamed({name: name for name in fit.names if name not in below})
-    beside = fit.covariance[gone][:, [fit.names.index(name) for name in rest.names]]
-    values = rest.values - fit.values[gone] @ np.linalg.solve(fit.covariance[np.ix_(gone, gone)], beside)
-    fixed = {**fit.fixed, **dict.fromkeys(below, Fixed(value=0.0, reason="would come out negative"))}
-    return _held_at_zero(
-        replace(fit, names=rest.names, values=values, covariance=rest.covariance, fixed=fixed)
-    )
+    zero = Fixed(value=0.0, reason="would come out negative")
+    found = {**vars(fit.at(dict.fromkeys(below, 0.0))), "fixed": {**fit.fixed, **dict.fromkeys(below, zero)}}
+    return _held_at_zero(replace(fit, **found))
 
 
 def _besides(design: Design) -> dict[str, tuple[float, float]]:
@@ -209,12 +204,9 @@ def _besides(design: Design) -> dict[str, tuple[float, float]]:
 
 def _written_item(written: Design, lines: Lines, record: str, reaction: float) -> Item:
     """The response of the design as it was written against the measured lines."""
-    coupling, friction = written.coupling, written.load.friction or LoadFriction()
-    assert coupling is not None
-    inertias = written.motor_side_inertia_kgm2, written.load_side_inertia_kgm2
-    own = (*inertias, coupling.stiffness_Nm_rad, coupling.damping_Nms_rad)
-    values = (*own, written.friction.viscous_Nms_rad, friction.viscous_Nms_rad)
-    named = dict(zip(two_mass.NAMES, values, strict=True))
+    named = {name: parameter_value(written, parameter(name).key) for name in two_mass.NAMES}
+    named["motor_inertia"] = written.motor_side_inertia_kgm2
+    named["load_inertia"] = written.load_side_inertia_kgm2
     model, _ = two_mass.angle_responses(lines.omega_rad_s, named, written.ratio_to_coupling, reaction)
     measured, relative = two_mass.response(lines)
     weight = 1.0 / np.maximum(relative, 1e-3)

@@ -65,7 +65,9 @@ def _term(model: JointModel, speed: float) -> Bend:
     tables, rests, fitted, drive = [], [], [], 0.0
     for weight, part in zip(model.weights, model.records, strict=True):
         rows = part.compared if model.simulated else away_from_reversals(part)
-        term, used = part.answered(_bent(part.speed, speed)), part.compared
+        fast, used = np.abs(part.speed), part.compared
+        bent = fast if np.isinf(speed) else np.sign(part.speed) * np.maximum(speed - fast, 0.0)
+        term = part.answered(bent)
         tables.append(weight * np.column_stack([part.w, *kept_columns(model, part), term])[rows])
         rests.append(weight * part.noise[rows[used]])
         drive = float(np.hypot(drive, weight * np.linalg.norm(part.y[rows])))
@@ -99,9 +101,3 @@ def kept_columns(model: JointModel, part: RecordFit) -> Iterator[Floats]:
         yield part.answered(part.speed)
     if not kinds & {"dry", "map"}:
         yield part.answered(np.sign(part.speed))
-
-
-def _bent(speed: Floats, below: float) -> Floats:
-    """The term that is tried."""
-    size = np.abs(speed)
-    return size if np.isinf(below) else np.sign(speed) * np.maximum(below - size, 0.0)

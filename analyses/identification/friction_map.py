@@ -1,17 +1,14 @@
 """Friction as a map over the speed: break points found, and judged against the plain law."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
 from scipy.optimize import minimize_scalar
 
-from actuator_lti.design.model import Design
 from actuator_lti.types import Floats, Mask
 from analyses.estimation.means import correlation_time
-from analyses.identification.inverse import fit_records
-from analyses.identification.joint_model import JointModel, LawChoice, Recipe, RecordFit, linear_basis
-from analyses.records.record import Record
+from analyses.identification.joint_model import JointModel, LawChoice, RecordFit, linear_basis
 
 MOST_BREAKS = 4
 GRID = 24
@@ -19,28 +16,16 @@ LEAST_SHARE = 0.005
 CLEARLY_BETTER = 6.0  # of the criterion, for a law to be taken (strong evidence; Kass and Raftery 1995)
 
 
-def fit_map(
-    design: Design,
-    records: Sequence[Record],
-    *,
-    recipe: Recipe | None = None,
-    fixed: Mapping[str, float] | None = None,
-    gravity: bool = False,
-) -> JointModel:
+def fit_map(fit: Callable[..., JointModel]) -> JointModel:
     """Fit friction maps with one to four break points, and take one only where it is clearly better.
 
     The break points are found one after the other, each where it lowers the residual most among
-    `speeds_tried`, and then moved in turn.
+    `speeds_tried`, and then moved in turn. ``fit`` is `fit_records` of some records.
     """
-
-    def fitted(knots: tuple[float, ...] | None) -> JointModel:
-        return fit_records(design, records, recipe=recipe, fixed=fixed, gravity=gravity, knots_rad_s=knots)
-
-    plain = fitted(None)
+    plain = fit()
     clear = [(part, away_from_reversals(part)) for part in plain.records]
-    speed, rest = (
-        np.concatenate([getattr(part, name)[rows] for part, rows in clear]) for name in ("speed", "friction")
-    )
+    speed = np.concatenate([part.speed[rows] for part, rows in clear])
+    rest = np.concatenate([part.friction[rows] for part, rows in clear])
     top, n = float(np.max(np.abs(speed))), len(rest) / correlation_time(plain.residual)
     breaks: tuple[float, ...] = ()
     models, laws = [plain], [_law((), plain, n)]
@@ -48,7 +33,7 @@ def fit_map(
         breaks = _one_more(speed, rest, top, breaks)
         if len(breaks) < count:
             break
-        models.append(fitted((0.0, *breaks, top)))
+        models.append(fit(knots_rad_s=(0.0, *breaks, top)))
         laws.append(_law(breaks, models[-1], n))
     laws = [replace(law, criterion=law.criterion - laws[0].criterion) for law in laws]
     best = min(range(len(laws)), key=lambda k: laws[k].criterion + (CLEARLY_BETTER if k else 0.0))

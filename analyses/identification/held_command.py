@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from operator import truediv
 
 import numpy as np
 
@@ -29,6 +30,9 @@ from analyses.identification.output_error import ITERATIONS, fit_output, simulat
 from analyses.identification.own_bias import same_fit, with_model_signals, with_noise
 from analyses.records.record import Record
 
+Pair = tuple[Floats, Floats]
+Records = Sequence[Record]
+Nearest = Callable[[Records], bool]
 INDUCTANCE = parameter("inductance").key
 BACK, TORQUE = parameter("back_emf").key, parameter("torque_constant").key
 NOT_SHOWN = "the records do not show it (they are as likely with none)"
@@ -38,34 +42,31 @@ SETTLED = 0.05  # of what a signal leaves, within which its weight may still mov
 
 
 def found_together(
-    design: Design,
-    records: Sequence[Record],
-    model: JointModel,
-    others: Sequence[Sequence[Record]],
-    is_nearest: Callable[[Sequence[Record]], bool],
+    design: Design, records: Records, model: JointModel, others: Sequence[Records], is_nearest: Nearest
 ) -> Fit | None:
     """Values of the motion and of the motor, by their names, with which the simulated drive has the records.
 
     ``design`` is where the search begins, and where it has no friction ``model``, which tells what is looked
-    for of the motion. In a first search each signal
-    counts by what the best of ``others``, records simulated with other commands, leaves of it. None where the
-    records that are simulated behind it are not the nearest.
+    for of the motion. In a first search each signal counts by what the best of ``others``, records simulated
+    with other commands, leaves of it. None where the records that are simulated behind it are not the
+    nearest.
     """
     back = design.motor.back_emf_constant_Vs_rad or design.motor.torque_constant_Nm_A
     design = to_design.with_structure(with_values(design, {BACK: float(back or 0.0)}), model)
     motor = [one for one in NAMES if parameter(one).key and parameter_value(design, parameter(one).key)]
-    inertia = max(to_design.INERTIAS, key=lambda key: _part_of_inertia(design, key))
+    whole = design.inertia_kgm2
+    inertia = max(to_design.INERTIAS, key=lambda key: truediv(*to_design.inertia_share(design, whole, key)))
     keys = {name: parameter(name).key or inertia for name in (*model.names, *motor)}
     design = with_values(design, _first_friction(design, model))
-    found = _by_simulation(design, records, tuple(keys.values()), others, is_nearest)
+    found = _Search(design, tuple(keys.values())).by_simulation(records, others, is_nearest)
     if found is None:
         return None
     made = with_values(design, dict(zip(found.names, found.values.tolist(), strict=True)), check=False)
     scale = to_design.inertia_share(design, made.inertia_kgm2, inertia)[1]
     told = {name: key for name, key in keys.items() if key in found}
     slopes = {name: {key: 1.0 / scale if name == "inertia" else 1.0} for name, key in told.items()}
-    whole = found.mapped(slopes, {"inertia": made.inertia_kgm2} if "inertia" in keys else {})
-    return replace(whole, fixed=found.fixed)
+    mapped = found.mapped(slopes, {"inertia": made.inertia_kgm2} if "inertia" in keys else {})
+    return replace(mapped, fixed=found.fixed)
 
 
 def _first_friction(design: Design, model: JointModel) -> dict[str, float]:
@@ -77,35 +78,7 @@ def _first_friction(design: Design, model: JointModel) -> dict[str, float]:
     return first | {"friction.offset_torque": 0.0} if reverse else first
 
 
-def _part_of_inertia(design: Design, key: str) -> float:
-    value, scale = to_design.inertia_share(design, design.inertia_kgm2, key)
-    return value / scale
-
-
-def _by_simulation(
-    design: Design,
-    records: Sequence[Record],
-    keys: tuple[str, ...],
-    others: Sequence[Sequence[Record]],
-    is_nearest: Callable[[Sequence[Record]], bool],
-) -> Fit | None:
-    """Values of keys with which the simulated drive has the currents and voltages of records; kM as kE."""
-    parts = [simulated_part(design, record) for record in records]
-    wanted = _drives(parts)
-    lefts = [[left.std() for left in map(np.subtract, wanted, _drives(like))] for like in others]
-    sizes = np.min([[one.std() for one in wanted], *lefts], axis=0)
-    parts = [as_driven(design, part) for part in parts]
-    first = _first(design, keys, parts, sizes, design)
-    if not is_nearest([with_model_signals(first.design, part) for part in parts]):
-        return None
-    found = _with_inductance(design, keys, first)
-    try:
-        return _at_its_ticks(design, keys, found)
-    except np.linalg.LinAlgError:
-        raise NumericalError(f"the records do not tell {', '.join(keys)} apart") from None
-
-
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class _Likeliest:
     """Where a search ended: its values are the design's."""
 
@@ -113,7 +86,7 @@ class _Likeliest:
     keys: tuple[str, ...]
     parts: Sequence[Record]
     sizes: Floats  # of what is left of each signal
-    told: Sequence[tuple[Floats, Floats]]  # slopes of each over the values, what is left, of unit size
+    told: Sequence[Pair]  # slopes of each over the values, what is left, of unit size
     unlikely: float  # twice the negative logarithm of the likelihood of white noise, but for a constant
     freed: _Likeliest | None = None  # where the inductance is found too, though the records do not show it
 
@@ -137,128 +110,128 @@ class _Likeliest:
         return Fit(names=self.keys, values=values, covariance=covariance, fixed=fixed)
 
 
-def _with_inductance(
-    design: Design, keys: tuple[str, ...], first: _Likeliest, than: float = np.inf
-) -> _Likeliest:
-    """The likeliest values, the design's inductance kept where the records show none and do not deny it."""
-    freed = _likeliest(design, keys, first.parts, first.sizes, first.design, than=than)
-    if first.keys == keys or freed.unlikely > than + SHOWN**2:
-        return freed
-    denied = freed.unlikely + SHOWN**2
-    without = with_values(design, {INDUCTANCE: NONE * parameter_value(design, INDUCTANCE)})
-    if _likeliest(without, first.keys, first.parts, freed.sizes, first.design).unlikely <= denied:
-        held = _likeliest(design, first.keys, first.parts, freed.sizes, first.design)
-        if held.unlikely <= denied:
-            return replace(held, freed=freed)
-    return replace(freed, unlikely=denied)
+@dataclass(frozen=True)
+class _Search:
+    """A search for the values of keys beside those of a design, kM as kE."""
 
+    design: Design
+    keys: tuple[str, ...]
 
-def _first(
-    design: Design, keys: tuple[str, ...], parts: Sequence[Record], sizes: Floats, start: Design
-) -> _Likeliest:
-    """One search with the inductance of the design.
+    def by_simulation(self, records: Records, others: Sequence[Records], is_nearest: Nearest) -> Fit | None:
+        """Values with which the simulated drive has the currents and voltages of records."""
+        parts = [simulated_part(self.design, record) for record in records]
+        wanted = _drives(parts)
+        lefts = [[left.std() for left in map(np.subtract, wanted, _drives(like))] for like in others]
+        sizes = np.min([[one.std() for one in wanted], *lefts], axis=0)
+        parts = [as_driven(self.design, part) for part in parts]
+        first = self.first(parts, sizes, self.design)
+        if not is_nearest([with_model_signals(first.design, part) for part in parts]):
+            return None
+        try:
+            return self.at_its_ticks(self.with_inductance(first))
+        except np.linalg.LinAlgError:
+            raise NumericalError(f"the records do not tell {', '.join(self.keys)} apart") from None
 
-    Without one the samples stand still over it: a search that comes to such from afar would stay there.
-    """
-    rest = tuple(key for key in keys if key != INDUCTANCE)
-    return _likeliest(design, rest, parts, sizes, start, rounds=1)
+    def with_inductance(self, first: _Likeliest, than: float = np.inf) -> _Likeliest:
+        """The likeliest, the design's inductance kept where the records show none and do not deny it."""
+        freed = self.likeliest(first.parts, first.sizes, first.design, than=than)
+        if first.keys == self.keys or freed.unlikely > than + SHOWN**2:
+            return freed
+        denied, held = freed.unlikely + SHOWN**2, freed
+        none = {INDUCTANCE: NONE * parameter_value(self.design, INDUCTANCE)}
+        for design in (with_values(self.design, none), self.design):
+            held = _Search(design, first.keys).likeliest(first.parts, freed.sizes, first.design)
+            if held.unlikely > denied:
+                return replace(freed, unlikely=denied)
+        return replace(held, freed=freed)
 
+    def first(self, parts: Sequence[Record], sizes: Floats, start: Design) -> _Likeliest:
+        """One round with the inductance of the design.
 
-def _likeliest(
-    design: Design,
-    keys: tuple[str, ...],
-    parts: Sequence[Record],
-    sizes: Floats,
-    start: Design,
-    *,
-    rounds: int = ITERATIONS,
-    than: float = np.inf,
-) -> _Likeliest:
-    """Search from ``start``, each signal weighed by what is left of it, until that settles.
+        Without one the samples stand still over it: a search that comes to such from afar would stay there.
+        """
+        rest = tuple(key for key in self.keys if key != INDUCTANCE)
+        return _Search(self.design, rest).likeliest(parts, sizes, start, rounds=1)
 
-    Given up where it lacks more of being as likely as another, ``than``, than its last round has gained.
-    """
-    measured = [measured_signals(design, part) for part in parts]
-    wanted, before = _drives(measured), np.inf
-    rows = np.array([len(one) for one in wanted])
+    def likeliest(
+        self, parts: Records, sizes: Floats, start: Design, *, rounds: int = ITERATIONS, than: float = np.inf
+    ) -> _Likeliest:
+        """Search from ``start``, each signal weighed by what is left of it, until that settles.
 
-    def weighed(signals: Sequence[Floats]) -> Floats:
-        return np.concatenate([one / size for one, size in zip(signals, sizes, strict=True)])
+        Given up where it lacks more of being as likely as another, ``than``, than its last round has gained.
+        """
+        design, keys, parts = self.design, self.keys, list(parts)
+        measured = [measured_signals(design, part) for part in parts]
+        wanted, before = _drives(measured), np.inf
+        rows = np.array([len(one) for one in wanted])
 
-    def made(tried: Design) -> Floats:
-        tried = _one_constant(design, tried)
-        runs = [model_signals(tried, *each)[0] for each in zip(parts, measured, strict=True)]
-        return weighed(_drives(runs))
+        def weighed(signals: Sequence[Floats]) -> Floats:
+            return np.concatenate([one / size for one, size in zip(signals, sizes, strict=True)])
 
-    for turn in range(rounds):
-        moved = fit_output(design, keys, made, weighed(wanted), begin=_values(start, keys))
-        start = with_values(design, dict(zip(keys, moved.values.tolist(), strict=True)), check=False)
-        slopes, rests = (np.split(each, np.cumsum(rows)[:-1]) for each in (moved.slopes, moved.rest))
-        left = np.array([np.std(rest) for rest in rests])
-        sizes = sizes * left
-        unlikely = float(2.0 * rows @ np.log(sizes))
-        told = [(w / size, e / size) for w, e, size in zip(slopes, rests, left, strict=True)]
-        parts, told, moved_s = _at_their_rows(start, parts, sizes, told, anywhere=turn == 0)
-        if (
-            np.all(np.abs(left - 1.0) < SETTLED) and moved_s < SETTLED
-        ) or before - unlikely < unlikely - than:
-            break
-        before = unlikely
-    return _Likeliest(
-        design=_one_constant(design, start),
-        keys=keys,
-        parts=parts,
-        sizes=sizes,
-        told=told,
-        unlikely=unlikely,
-    )
+        def made(tried: Design) -> Floats:
+            tried = _one_constant(design, tried)
+            runs = [model_signals(tried, *each)[0] for each in zip(parts, measured, strict=True)]
+            return weighed(_drives(runs))
 
+        for turn in range(rounds):
+            moved = fit_output(design, keys, made, weighed(wanted), begin=_values(start, keys))
+            start = with_values(design, dict(zip(keys, moved.values.tolist(), strict=True)), check=False)
+            slopes, rests = (np.split(each, np.cumsum(rows)[:-1]) for each in (moved.slopes, moved.rest))
+            left = np.array([np.std(rest) for rest in rests])
+            sizes = sizes * left
+            unlikely = float(2.0 * rows @ np.log(sizes))
+            told = [(w / size, e / size) for w, e, size in zip(slopes, rests, left, strict=True)]
+            gram, moves = np.sum([w.T @ w for w, _ in told], axis=0), np.zeros(len(parts))
+            for k, part in enumerate(parts):
+                pair, at = slice(2 * k, 2 * k + 2), (start, part)
+                parts[k], told[pair], moves[k] = _at_its_rows(*at, sizes[pair], told[pair], gram, turn == 0)
+            settled = np.all(np.abs(left - 1.0) < SETTLED) and moves.max() < SETTLED
+            if settled or before - unlikely < unlikely - than:
+                break
+            before = unlikely
+        return _Likeliest(_one_constant(design, start), keys, parts, sizes, told, unlikely)
 
-def _at_their_rows(
-    design: Design,
-    parts: Sequence[Record],
-    sizes: Floats,
-    told: Sequence[tuple[Floats, Floats]],
-    *,
-    anywhere: bool,
-) -> tuple[list[Record], list[tuple[Floats, Floats]], float]:
-    """The records with their rows where they likeliest are between the ticks, and the slopes without that.
+    def at_its_ticks(self, found: _Likeliest) -> Fit:
+        """The fit with the steps of each command at the ticks with which the records are likeliest.
 
-    ``told``: slopes over the values and what is left, of unit size. Also the largest of the moves, in its
-    standard errors. ``anywhere``: not only from where they are.
-    """
-    gram = np.sum([w.T @ w for w, _ in told], axis=0)
-    pairs = [slice(k, k + 2) for k in range(0, len(told), 2)]
-    each = [
-        _at_its_rows(design, one, sizes[pair], told[pair], gram, anywhere)
-        for one, pair in zip(parts, pairs, strict=True)
-    ]
-    return (
-        [one for one, *_ in each],
-        [one for _, two, _ in each for one in two],
-        max(move for *_, move in each),
-    )
+        A tick later or earlier is another minimum, as the inductance delays too: each is searched to its end,
+        and counts in the covariance by how likely it is beside the likeliest.
+        """
+        tried = [found]
+        for k in range(len(found.parts)):
+            for turn in (1, -1):
+                before = found
+                while (other := _moved_steps(found, k, turn)) is not None:
+                    first = self.first(other, found.sizes, found.design)
+                    tried.append(self.with_inductance(first, found.unlikely))
+                    if tried[-1].unlikely >= found.unlikely:
+                        break
+                    found = tried[-1]
+                if found is not before:
+                    break
+        fit = found.fit
+        others = sum(np.exp(-0.5 * abs(one.unlikely - found.unlikely)) * found.away(one) for one in tried)
+        return replace(fit, covariance=fit.covariance + others)
 
 
 def _at_its_rows(
-    design: Design,
-    part: Record,
-    sizes: Floats,
-    told: Sequence[tuple[Floats, Floats]],
-    gram: Floats,
-    anywhere: bool,
-) -> tuple[Record, Sequence[tuple[Floats, Floats]], float]:
-    """The same of one record; beforehand every time at which its rows show the same jumps is as likely."""
+    design: Design, part: Record, sizes: Floats, told: Sequence[Pair], gram: Floats, anywhere: bool
+) -> tuple[Record, Sequence[Pair], float]:
+    """A record with its rows where they likeliest are between the ticks, and the slopes without that.
+
+    ``told``: slopes over the values and what is left, of unit size. Also the move, in its standard errors;
+    beforehand every time at which the rows show the same jumps is as likely. ``anywhere``: not only from
+    where they are.
+    """
     if (ends := later_s(design, part)) is None:
         return part, told, 0.0
     measured, w = measured_signals(design, part), np.concatenate([slopes for slopes, _ in told])
 
     def left(more: float) -> Floats:
         moved = replace(part, early_s=np.asarray(part.early_s) + more)
-        pairs = zip(
-            _drives([measured]), _drives([model_signals(design, moved, measured)[0]]), sizes, strict=True
-        )
-        return np.concatenate([(own - made) / size for own, made, size in pairs])
+        made = _drives([model_signals(design, moved, measured)[0]])
+        triples = zip(_drives([measured]), made, sizes, strict=True)
+        return np.concatenate([(own - other) / size for own, other, size in triples])
 
     def alone(values: Floats) -> Floats:
         return np.asarray(values - w @ np.linalg.solve(gram, w.T @ values))
@@ -274,29 +247,6 @@ def _at_its_rows(
     w = w - np.outer(column, column @ w / (column @ column + known))
     own = list(zip(np.split(w, 2), (rest for _, rest in told), strict=True))
     return replace(part, early_s=np.asarray(part.early_s) + more), own, abs(more) * float(np.sqrt(sure))
-
-
-def _at_its_ticks(design: Design, keys: tuple[str, ...], found: _Likeliest) -> Fit:
-    """The fit with the steps of each command at the ticks with which the records are likeliest.
-
-    A tick later or earlier is another minimum, as the inductance delays too: each is searched to its end, and
-    counts in the covariance by how likely it is beside the likeliest.
-    """
-    tried = [found]
-    for k in range(len(found.parts)):
-        for turn in (1, -1):
-            before = found
-            while (other := _moved_steps(found, k, turn)) is not None:
-                first = _first(design, keys, other, found.sizes, found.design)
-                tried.append(_with_inductance(design, keys, first, found.unlikely))
-                if tried[-1].unlikely >= found.unlikely:
-                    break
-                found = tried[-1]
-            if found is not before:
-                break
-    fit = found.fit
-    others = sum(np.exp(-0.5 * abs(one.unlikely - found.unlikely)) * found.away(one) for one in tried)
-    return replace(fit, covariance=fit.covariance + others)
 
 
 def _values(design: Design, keys: Sequence[str]) -> Floats:

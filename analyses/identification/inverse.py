@@ -112,8 +112,12 @@ def _fitted(
         raise InputError("nothing is left to fit: all parameters are fixed", where=blocks[0].name)
     weights = np.ones(len(blocks)) if given is None else np.asarray(given, dtype=float)
     solution = problem.solved(weights)
+    ends = np.cumsum([block.rows_used for block in blocks])[:-1]
     for _ in range(3 if len(blocks) > 1 and given is None else 0):
-        weights = _weights(blocks, solution, weights)
+        # by the inverse residual of each record, against the median so that the size of things stays
+        sizes = np.array([np.sqrt(np.mean(part**2)) for part in np.split(solution.residual, ends)]) / weights
+        middle = float(np.median(sizes))
+        weights = weights if middle == 0.0 else np.asarray(middle / np.maximum(sizes, 0.05 * middle))
         solution = problem.solved(weights)
     found = dict(zip(problem.free, solution.values.tolist(), strict=True))
     negative = {name: value for name, value in found.items() if value < 0.0 and name not in SIGNED}
@@ -152,15 +156,6 @@ def _of_fixed(design: Design, free: tuple[str, ...], fixed: Mapping[str, Fixed])
     return added
 
 
-def _weights(blocks: Sequence[Rows], solution: Solution, weights: Floats) -> Floats:
-    """Inverse residual of each record, against the median so that the size of things stays."""
-    ends = np.cumsum([block.rows_used for block in blocks])
-    parts = np.split(solution.residual, ends[:-1])
-    sizes = np.array([np.sqrt(np.mean(part**2)) for part in parts]) / weights
-    middle = float(np.median(sizes))
-    return weights if middle == 0.0 else np.asarray(middle / np.maximum(sizes, 0.05 * middle))
-
-
 def _single(block: Rows, problem: _Problem, found: Mapping[str, float]) -> tuple[Fit, Floats]:
     """One record fitted alone, and its residual: what it tells, the rest held at what all gave."""
     kept, left = told_apart(block.columns(problem.free), problem.free)
@@ -180,11 +175,10 @@ def _model(design: Design, problem: _Problem, solution: Solution, weights: Float
     parts = []
     for block, rest, own in zip(blocks, rests, [rest for _, rest in singles] or rests, strict=True):
         other = block.explained(found, [name for name in block.names if not name.startswith(FRICTION)])
-        rows = vars(replace(block, names=free, w=block.columns(free)))
         left: dict[str, Any] = {"residual": rest, "own_residual": own, "noise": own}
-        left["inputs"] = np.column_stack([block.speed, block.acceleration])
-        every = np.ones(len(own), dtype=bool)
-        parts.append(RecordFit(**rows, **left, friction=block.y - other, compared=every))
+        left |= {"inputs": np.column_stack([block.speed, block.acceleration]), "friction": block.y - other}
+        left |= {"names": free, "w": block.columns(free), "compared": np.ones(len(own), dtype=bool)}
+        parts.append(RecordFit(**{**vars(block), **left}))
     told = [information_of(g * one.w, g * one.own_residual) for g, one in zip(weights, parts, strict=True)]
     drive = np.concatenate([block.y for block in blocks])
     model = JointModel(

@@ -81,11 +81,11 @@ def _measured(
 def _follows(design: Design, coupling: Coupling, record: Record, motion: Motion, moment: Floats) -> Motion:
     """The load's motion that the motor's makes through the design's coupling, from rest in the twist."""
     friction, inertia = design.load.friction or LoadFriction(), design.load_side_inertia_kgm2
-    k, c = coupling.stiffness_Nm_rad, coupling.damping_Nms_rad
     driver = motion.scaled(1.0 / design.ratio_to_coupling)
-    viscous, dry, offset = friction.viscous_Nms_rad, friction.dry_torque_Nm, friction.offset_torque_Nm
     if inertia == 0.0:
         return driver
+    k, c = coupling.stiffness_Nm_rad, coupling.damping_Nms_rad
+    viscous, dry, offset = friction.viscous_Nms_rad, friction.dry_torque_Nm, friction.offset_torque_Nm
     a = np.array([[0.0, 1.0], [-k / inertia, -(c + viscous) / inertia]])
     system = (a, np.array([[0.0], [1.0 / inertia]]), np.eye(2), np.zeros((2, 1)))
     time = record.period_s * np.arange(len(moment))

@@ -85,14 +85,19 @@ def identify_response(
     if start.load.inertia_kgm2 == 0.0:
         held.setdefault("load.inertia", Fixed(value=0.0, reason="0 in the design: kept"))
     names = tuple(key for key in KEYS if key in paths_of(start) and key not in held)
-    _refuse_too_few(2 * len(size), len(names), measured.name)
+    if (numbers := 2 * len(size)) <= (unknowns := len(names)):  # no degrees of freedom, no interval
+        told = f"{len(size)} frequencies are {numbers} numbers for {unknowns} unknowns"
+        allowed = f"{unknowns // 2 + 1} frequencies or more, or fewer unknowns (--fix KEY=VALUE)"
+        raise InputError(f"{told}: no interval can be given; allowed: {allowed}", where=measured.name)
     fit = determined(start, names, seen, progress)
     kept = [key for key, one in fit.fixed.items() if one.value]
     scales = [name for name, one in CONSTANTS.items() if getattr(start.motor, one) is not None]
     toleranced = [key for key in held if own_std(start, key) > 0.0]
     hanging_on = [*kept, *toleranced, *scales[:1] * CONSTANT_KEYS.isdisjoint(held)]
     given = _given(start, replace(fit, fixed={**held, **fit.fixed}), seen, hanging_on)
-    given |= {key: _fixed(given[key]) for key in held.keys() & given.keys()}
+    words = "the standard errors are those at it, the written design has its tolerance correlated with them"
+    for key in held.keys() & given.keys():  # fixed as asked, with a tolerance in the design
+        given[key] = replace(given[key], reason=f"{given[key].reason}; {words}")
     hanging, constant = fit.fixed.keys() & given.keys(), at_constant(replace(fit, fixed=given), start)
     made = _written(start, fit, given, f"frequency response {measured.name}{constant}")
     given |= {key: _told(start, key, given[key]) for key in hanging}
@@ -148,15 +153,7 @@ def _reach_items(made: Design, start: Design, measured: RecordedResponse) -> Ite
 
 
 def _beside(value: float, own: float, unit: str) -> str:
-    return (
-        f"{value:.4g} {unit}, {value / own:.3g} of the design's {own:.4g}" if own else f"{value:.4g} {unit}"
-    )
-
-
-def _fixed(one: Fixed) -> Fixed:
-    """What is fixed as asked and has a tolerance in the design."""
-    words = "the standard errors are those at it, the written design has its tolerance correlated with them"
-    return replace(one, reason=f"{one.reason}; {words}")
+    return f"{value:.4g} {unit}" + (f", {value / own:.3g} of the design's {own:.4g}" if own else "")
 
 
 def _given(start: Design, fit: ResponseFit, seen: Seen, names: Sequence[str]) -> dict[str, Fixed]:
@@ -180,10 +177,9 @@ def _hanging(start: Design, fit: ResponseFit, given: Mapping[str, Fixed], keys: 
     moves = np.array([[given[key].moves[name] for key in kept] for name in fit.names])
     moves = moves.reshape(len(fit.names), len(kept))
     std = np.array([own_share(start, key, given[key].value) * given[key].value for key in kept])
-    own = np.outer(std, std) * correlation_of(start, kept)
-    beside, more = moves @ own, np.array([given[key].value for key in kept])
-    covariance = np.block([[fit.covariance + moves @ own @ moves.T, beside], [beside.T, own]])
-    return Fit(names=(*fit.names, *kept), values=np.append(fit.values, more), covariance=covariance)
+    own, more = np.outer(std, std) * correlation_of(start, kept), [given[key].value for key in kept]
+    wide = replace(fit, covariance=fit.covariance + moves @ own @ moves.T)
+    return wide.joined(Fit(names=tuple(kept), values=np.array(more), covariance=own), moves @ own)
 
 
 def _written(start: Design, fit: ResponseFit, given: Mapping[str, Fixed], source: str) -> Design:
@@ -203,11 +199,3 @@ def _told(start: Design, key: str, kept: Fixed) -> Fixed:
     if own_std(start, key) > 0.0:
         words = f"{share}, by its tolerance); the written design has them correlated with it"
     return replace(kept, reason=f"{kept.reason}; the standard errors hold {words}")
-
-
-def _refuse_too_few(numbers: int, unknowns: int, where: str) -> None:
-    """Without degrees of freedom there is no interval."""
-    if numbers <= unknowns:
-        told = f"{numbers // 2} frequencies are {numbers} numbers for {unknowns} unknowns"
-        allowed = f"{unknowns // 2 + 1} frequencies or more, or fewer unknowns (--fix KEY=VALUE)"
-        raise InputError(f"{told}: no interval can be given; allowed: {allowed}", where=where)

@@ -1,9 +1,9 @@
 """The motor by its voltage, the motion by its current, in turn; and how the drive took its command."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cached_property, partial
 
 import numpy as np
 from scipy.stats import wilcoxon
@@ -47,42 +47,159 @@ class Found:
     right: Diagnosed
 
 
-def motor_and_motion(
-    design: Design, plain: Design, records: Sequence[Record], settings: Settings, recipe: Recipe | None
-) -> Found:
-    """What the records tell, in each way in which the drive may have taken its commands between the rows.
+@dataclass(frozen=True)
+class Sought:
+    """What is looked for in records: beside a design as it came, and with what is fixed."""
 
-    The own bias of the fits hangs on it, and where it is taken off the wrong way, that way meets the records
-    better than the right one does: so each is followed to its end, and what then meets the records best is
-    taken; where that is a simulated drive whose command is held, the other ways are simulated as well. In the
-    covariances every other counts by the probability that it is nearer.
-    """
-    commands = [(command_of(plain, record), record) for record in records]
-    read = {one.between: None for own, record in commands if own for one in readings(own, record)}
-    ways = [
-        [replace(one, between=way) for one in records] for way in sorted(read or [SMOOTH], key=HELD.__eq__)
-    ]
-    moves = {own.stage for own, _ in commands if own} <= {"position", "velocity"}
-    simulated = settings.electrical and settings.friction != "map" and not _gravity(plain, settings) and moves
-    together = partial(_together, design, plain, settings, recipe)
-    tried: list[Found] = []
-    for taken in ways:
-        found = together(tried, taken) if simulated and taken[0].between == HELD else None
-        tried += [_found(design, plain, taken, settings, recipe)] if found is None else found
-        if not tried[0].right.model.simulated:  # no bias is taken off
-            return tried[0]
-    if tried[-1].electrical is not None and tried[-1].electrical.with_motion is not None:
-        for taken in ways[:-1]:
-            with suppress(InputError, NumericalError):
-                tried += together(tried, taken) or []
-    misses = _misses(plain, [_both_ways(one) for one in tried])
-    best = int(np.argmin(np.sum(misses, axis=1)))
-    best_one = tried[best]
-    for other, more in zip(tried, misses - misses[best], strict=True):
-        if np.any(more):  # by ranks (Wilcoxon 1945), as one event may outweigh all other blocks
-            share = float(wilcoxon(more, alternative="greater").pvalue)
-            best_one = _widened(plain, best_one, other, share)
-    return best_one
+    design: Design
+    plain: Design
+    settings: Settings
+    recipe: Recipe | None
+
+    @cached_property
+    def held(self) -> dict[str, float]:
+        """What is held, by the names of the model; a fixed rotor or load inertia fixes the whole."""
+        form: FrictionForm = "symmetric" if self.settings.friction == "map" else self.settings.friction
+        names = (*NAMES[form], "load_coefficient")
+        whole = dict.fromkeys(to_design.INERTIAS, "inertia")
+        held = held_by_name(fixed_values(self.design, self.settings.fix), names, whole)
+        return held | {"inertia": self.plain.inertia_kgm2} if "inertia" in held else held
+
+    @property
+    def gravity(self) -> bool:
+        """Whether a pendulum is looked for."""
+        return self.settings.gravity or self.plain.load.gravity is not None
+
+    def motor_and_motion(self, records: Sequence[Record]) -> Found:
+        """What records tell, in each way in which the drive may have taken its commands between the rows.
+
+        The own bias of the fits hangs on it, and where it is taken off the wrong way, that way meets the
+        records better than the right one does: so each is followed to its end, and what then meets the
+        records best is taken; where that is a simulated drive whose command is held, the other ways are
+        simulated as well. In the covariances every other counts by the probability that it is nearer.
+        """
+        plain, settings = self.plain, self.settings
+        commands = [(command_of(plain, record), record) for record in records]
+        read = {one.between: None for own, record in commands if own for one in readings(own, record)}
+        betweens = sorted(read or [SMOOTH], key=HELD.__eq__)
+        ways = [[replace(one, between=way) for one in records] for way in betweens]
+        moves = {own.stage for own, _ in commands if own} <= {"position", "velocity"}
+        simulated = moves and settings.electrical and settings.friction != "map" and not self.gravity
+        tried: list[Found] = []
+        for taken in ways:
+            found = self._together(tried, taken) if simulated and taken[0].between == HELD else None
+            tried += [self._in_turn(taken)] if found is None else found
+            if not tried[0].right.model.simulated:  # no bias is taken off
+                return tried[0]
+        if tried[-1].electrical is not None and tried[-1].electrical.with_motion is not None:
+            for taken in ways[:-1]:
+                with suppress(InputError, NumericalError):
+                    tried += self._together(tried, taken) or []
+        misses = _misses(plain, [_both_ways(one) for one in tried])
+        best = int(np.argmin(np.sum(misses, axis=1)))
+        best_one = tried[best]
+        for other, more in zip(tried, misses - misses[best], strict=True):
+            if np.any(more):  # by ranks (Wilcoxon 1945), as one event may outweigh all other blocks
+                share = float(wilcoxon(more, alternative="greater").pvalue)
+                best_one = _widened(plain, best_one, other, share)
+        return best_one
+
+    def _together(self, others: Sequence[Found], records: Sequence[Record]) -> list[Found] | None:
+        """Motor and motion by simulation; again where a lag of the current was taken back.
+
+        Empty where others are nearer; None where the records do not tell all of it, or cannot be simulated.
+        """
+        plain, (_, raw) = self.plain, self.by_voltage(records)
+        model = self._raw(plain, records, [1.0] * len(records))
+        likes = [one.right.model.simulated for one in others]
+
+        def is_nearest(simulated: Sequence[Record]) -> bool:
+            misses = _misses(plain, [*map(_both_ways, others), (records, simulated)])
+            return int(np.argmin(np.sum(misses, axis=1))) == len(others)
+
+        first: Diagnosed | None = None
+        while True:
+            try:
+                both = found_together(plain, records, model, likes, is_nearest)
+            except (InputError, NumericalError):
+                return None
+            if both is None:
+                return []
+            motor = motor_of(both, raw)
+            start = _with_motor(plain, motor, records)
+            right = self._diagnosed(start, records, both)
+            if first or all(one is own for one, own in zip(right.records, records, strict=True)):
+                break
+            first, records = right, right.records
+        told = first or right
+        right = replace(right, late_s=told.late_s, findings=told.findings)
+        return [Found(start=start, electrical=motor, right=right)]
+
+    def _in_turn(self, records: Sequence[Record]) -> Found:
+        """The motor and the motion in turn.
+
+        The motion needs kM; the motor is found less its own bias on records that are simulated with both.
+        """
+        if not self.settings.electrical:
+            return Found(start=self.plain, electrical=None, right=self._diagnosed(self.plain, records))
+        start, found = self.by_voltage(records)
+        right = self._diagnosed(start, records)
+        for _ in range(ROUNDS):
+            before, model = found, right.model
+            start, found = self.by_voltage(records, (start, right))
+            right = self._diagnosed(start, records)
+            if _settled(before, found) and _settled(model, right.model):
+                break
+        return Found(start=start, electrical=found, right=right)
+
+    def by_voltage(
+        self, records: Sequence[Record], simulated: tuple[Design, Diagnosed] | None = None
+    ) -> tuple[Design, ElectricalFit]:
+        """The design with what the voltage equation tells of its motor, and that fit.
+
+        Less its own bias where the records were simulated, with the motor of the design given beside them.
+        """
+        late_s = 0.0 if simulated is None else simulated[1].late_s
+        found = fit_electrical(self.plain, records, self.recipe, late_s)
+        if simulated is not None:
+            start, right = simulated
+            found = without_own_bias(found, start, records, right.model, self.recipe)
+        return _with_motor(self.plain, found, records), found
+
+    def _diagnosed(self, start: Design, records: Sequence[Record], both: Fit | None = None) -> Diagnosed:
+        fit = partial(self._fitted, start, both=both)
+        return diagnosed(self.design, start, records, fit, self.recipe)
+
+    def _raw(
+        self, start: Design, records: Sequence[Record], weights: Sequence[float] | None = None
+    ) -> JointModel:
+        """The joint model as the settings ask; with weights of the records, see `fit_records`."""
+        fit, form = partial(fit_records, start, records, gravity=self.gravity), self.settings.friction
+        fit = partial(fit, recipe=self.recipe, fixed=self.held)
+        return fit_map(fit) if form == "map" else fit(form=form, weights=weights)
+
+    def _fitted(self, start: Design, records: Sequence[Record], both: Fit | None) -> JointModel:
+        """That, less its own bias, or with what was found with the motor."""
+        if down := [record for record in records if runs_down(start, record)]:
+            if len(down) < len(records):
+                raise InputError("nothing drives it: a run-down is identified by itself", where=down[0].name)
+            return fit_run_downs(start, records, self.settings, self.held)
+        model = self._raw(start, records, None if both is None else [1.0] * len(records))
+        parts = []
+        for part, record in zip(model.records, records, strict=True):
+            command = command_of(start, record)
+            told = "command of the simulated drive" + f", {record.between}" * (record.between != SMOOTH)
+            more = {} if command is None else {command.signal: told}
+            parts.append(replace(part, used={**more, **part.used}))
+
+        def made(model: JointModel) -> Design:
+            values = to_design.joint_values(start, model, inertia_to=self.settings.inertia_to)
+            return to_design.design_with_fit(to_design.with_structure(start, model), values, "")
+
+        model = replace(model, records=tuple(parts))
+        if both is not None:
+            return motion_of(both, start, made, model, records)
+        return with_noise_of_motion(start, without_bias(start, made, model, records), records)
 
 
 def _both_ways(found: Found) -> Both:
@@ -130,93 +247,9 @@ def _widened(plain: Design, taken: Found, other: Found, share: float) -> Found:
     return Found(start=start, electrical=motor, right=right)
 
 
-def _together(
-    design: Design,
-    plain: Design,
-    settings: Settings,
-    recipe: Recipe | None,
-    others: Sequence[Found],
-    records: Sequence[Record],
-) -> list[Found] | None:
-    """Motor and motion by simulation; again where a lag of the current was taken back.
-
-    Empty where others are nearer; None where the records do not tell all of it, or cannot be simulated.
-    """
-    held, (_, raw) = held_values(design, plain, settings), by_voltage(plain, records, recipe)
-    model = _raw(plain, settings, held, recipe, records, np.ones(len(records)))
-    likes = [one.right.model.simulated for one in others]
-
-    def is_nearest(simulated: Sequence[Record]) -> bool:
-        misses = _misses(plain, [*map(_both_ways, others), (records, simulated)])
-        return int(np.argmin(np.sum(misses, axis=1))) == len(others)
-
-    first: Diagnosed | None = None
-    while True:
-        try:
-            both = found_together(plain, records, model, likes, is_nearest)
-        except (InputError, NumericalError):
-            return None
-        if both is None:
-            return []
-        motor = motor_of(both, raw)
-        start = _with_motor(plain, motor, records)
-        fit = partial(_fitted, start, settings, held, recipe, both=both)
-        right = diagnosed(design, start, records, fit, recipe)
-        if first or all(one is own for one, own in zip(right.records, records, strict=True)):
-            break
-        first, records = right, right.records
-    told = first or right
-    right = replace(right, late_s=told.late_s, findings=told.findings)
-    return [Found(start=start, electrical=motor, right=right)]
-
-
-def _found(
-    design: Design, plain: Design, records: Sequence[Record], settings: Settings, recipe: Recipe | None
-) -> Found:
-    """The motor and the motion in turn.
-
-    The motion needs kM; the motor is found less its own bias on records that are simulated with both.
-    """
-
-    def moved(start: Design) -> Diagnosed:
-        fit = partial(_fitted, start, settings, held_values(design, start, settings), recipe)
-        return diagnosed(design, start, records, fit, recipe)
-
-    if not settings.electrical:
-        return Found(start=plain, electrical=None, right=moved(plain))
-    start, found = by_voltage(plain, records, recipe)
-    right = moved(start)
-    for _ in range(ROUNDS):
-        before, model = found, right.model
-        start, found = by_voltage(plain, records, recipe, (start, right))
-        right = moved(start)
-        if _settled(before, found) and _settled(model, right.model):
-            break
-    return Found(start=start, electrical=found, right=right)
-
-
 def _settled(before: Fit, found: Fit) -> bool:
     off = [abs(found[name] - before[name]) < SETTLED * found.std(name) for name in found.names]
     return found.names == before.names and all(off)
-
-
-def by_voltage(
-    plain: Design,
-    records: Sequence[Record],
-    recipe: Recipe | None,
-    simulated: tuple[Design, Diagnosed] | None = None,
-) -> tuple[Design, ElectricalFit]:
-    """The design with what the voltage equation tells of its motor, and that fit.
-
-    Less its own bias where the records were simulated, with the motor of the design given beside them.
-    """
-    if simulated is None:
-        found = fit_electrical(plain, records, recipe)
-    else:
-        start, right = simulated
-        found = fit_electrical(plain, records, recipe, right.late_s)
-        found = without_own_bias(found, start, records, right.model, recipe)
-    return _with_motor(plain, found, records), found
 
 
 def _with_motor(plain: Design, found: ElectricalFit, records: Sequence[Record]) -> Design:
@@ -227,65 +260,3 @@ def _with_motor(plain: Design, found: ElectricalFit, records: Sequence[Record]) 
 def names_of(records: Sequence[Record]) -> str:
     """The names of records, in a list."""
     return ", ".join(record.name for record in records)
-
-
-def held_values(design: Design, start: Design, settings: Settings) -> dict[str, float]:
-    """What is held, by the names of the model; a fixed rotor or load inertia fixes the whole."""
-    form: FrictionForm = "symmetric" if settings.friction == "map" else settings.friction
-    names = (*NAMES[form], "load_coefficient")
-    whole = dict.fromkeys(to_design.INERTIAS, "inertia")
-    held = held_by_name(fixed_values(design, settings.fix), names, whole)
-    return held | {"inertia": start.inertia_kgm2} if "inertia" in held else held
-
-
-def _gravity(start: Design, settings: Settings) -> bool:
-    return settings.gravity or start.load.gravity is not None
-
-
-def _raw(
-    start: Design,
-    settings: Settings,
-    held: Mapping[str, float],
-    recipe: Recipe | None,
-    records: Sequence[Record],
-    weights: Floats | None = None,
-) -> JointModel:
-    """The joint model as the settings ask; with weights of the records, see `fit_records`."""
-    fit = fit_map
-    if settings.friction != "map":
-        fit = partial(
-            fit_records, form=settings.friction, weights=None if weights is None else weights.tolist()
-        )
-    return fit(start, records, recipe=recipe, fixed=held, gravity=_gravity(start, settings))
-
-
-def _fitted(
-    start: Design,
-    settings: Settings,
-    held: Mapping[str, float],
-    recipe: Recipe | None,
-    records: Sequence[Record],
-    both: Fit | None = None,
-) -> JointModel:
-    """The joint model as the settings ask, less its own bias, or with what was found with the motor."""
-    if down := [record for record in records if runs_down(start, record)]:
-        if len(down) < len(records):
-            raise InputError("nothing drives it: a run-down is identified by itself", where=down[0].name)
-        return fit_run_downs(start, records, settings, held)
-    weights = None if both is None else np.ones(len(records))
-    model = _raw(start, settings, held, recipe, records, weights)
-    parts = []
-    for part, record in zip(model.records, records, strict=True):
-        command = command_of(start, record)
-        told = "command of the simulated drive" + f", {record.between}" * (record.between != SMOOTH)
-        more = {} if command is None else {command.signal: told}
-        parts.append(replace(part, used={**more, **part.used}))
-
-    def made(model: JointModel) -> Design:
-        values = to_design.joint_values(start, model, inertia_to=settings.inertia_to)
-        return to_design.design_with_fit(to_design.with_structure(start, model), values, "")
-
-    model = replace(model, records=tuple(parts))
-    if both is not None:
-        return motion_of(both, start, made, model, records)
-    return with_noise_of_motion(start, without_bias(start, made, model, records), records)

@@ -58,7 +58,7 @@ class Moved:
     at_bound: tuple[str, ...]
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class Resimulated:
     """The relative error of one record's signal under the written design, and how it was found."""
 
@@ -218,28 +218,20 @@ def resimulate(design: Design, record: Record, form: FrictionForm) -> Resimulate
             if part.left_out is not None:
                 columns = (each[~part.left_out] for each in (signal.time_s, signal.measured, signal.modelled))
                 signal = compare_signals(name, signal.unit, *columns)
-            error = signal.relative_error
-            first = "" if len(part) == len(record) else f"its first {len(part)} rows "
-            how = f"{name}, {first}simulated"
-            beyond = signal.left_by_noise * error
+            error, first = signal.relative_error, f"its first {len(part)} rows " * (len(part) < len(record))
+            how, beyond = f"{name}, {first}simulated", signal.left_by_noise * error
             how += f", {100.0 * error:.3g} % with its white noise" if error - beyond > 1e-3 else ""
-            return Resimulated(
-                record=record.name, signal=name, relative_error=error, beyond_noise=beyond, how=how
-            )
+            return Resimulated(record.name, name, error, beyond, how)
         except InputError as refusal:  # a part that the simulator does not have
             why = f" ({refusal.message})"
     if runs_down(design, record):
         error = decay_of(design, record, found=False).relative_error
-        how = "the decay of its motion"
-        return Resimulated(
-            record=record.name, signal="motion", relative_error=error, beyond_noise=error, how=how
-        )
+        return Resimulated(record.name, "motion", error, error, "the decay of its motion")
     knots = [point.speed_rad_s for point in design.friction.map(1)] or None
     rows = record_rows(design, record, form, None, knots_rad_s=knots)
     rest = rows.y - rows.explained({name: default_value(design, name) for name in rows.names}, rows.names)
     error = float(np.linalg.norm(rest) / np.linalg.norm(rows.y))
-    how = f"torque needed for its motion{why}"
-    return Resimulated(record=record.name, signal="drive", relative_error=error, beyond_noise=error, how=how)
+    return Resimulated(record.name, "drive", error, error, f"torque needed for its motion{why}")
 
 
 def simulated_part(design: Design, record: Record) -> Record:

@@ -56,7 +56,9 @@ def without_bias(
                 return replace(model, bias_told=reason)
             driven = driven or tuple(_driven(made, record) for record in records)
             less = replace(less, simulated=tuple(with_model_signals(made, record) for record in driven))
-            again = fit([_as_used(*each) for each in zip(less.simulated, model.records, strict=True)])
+            pairs = zip(less.simulated, model.records, strict=True)
+            # without an output's encoder (free of noise) that the measured one left out
+            again = fit([one.without({"output_angle"} - part.used.keys()) for one, part in pairs])
         except (InputError, NumericalError) as error:
             return replace(less, bias_told=f"not taken off: {error}")
         before, less = less, replace(_corrected(start, made, model, again), simulated=less.simulated)
@@ -79,12 +81,6 @@ def same_fit(start: Design, model: JointModel) -> Callable[[Sequence[Record]], J
     )
 
 
-def _as_used(simulated: Record, measured: RecordFit) -> Record:
-    """The simulated record without an output's encoder (free of noise) that the measured one left out."""
-    unused = {"output_angle"} - measured.used.keys()
-    return replace(simulated, signals={n: v for n, v in simulated.signals.items() if n not in unused})
-
-
 def _corrected(start: Design, made: Design, model: JointModel, again: JointModel) -> JointModel:
     parts = with_noise(model, again)
     triples = list(zip(model.weights, model.records, parts, strict=True))
@@ -94,22 +90,26 @@ def _corrected(start: Design, made: Design, model: JointModel, again: JointModel
     less = replace(model, values=model.values + more, records=parts)
     found = {n: again[n] - default_value(made, n, start) for n in model.names if n in again.names}
     bias = np.array([found.get(name, 0.0) for name in model.names])
-    wild = [n for n, b, s in zip(model.names, bias, _sizes(model), strict=True) if abs(b) > LARGEST_BIAS * s]
+    # against the value or, where it may be zero, that of its kind or its error
+    gravity = math.hypot(model.get("gravity_sin", 0.0), model.get("gravity_cos", 0.0))
+    dry = next((abs(model[n]) for n in ("dry", "dry_forward", "map_0") if n in model), 0.0)
+    like = [gravity if n.startswith("gravity") else dry if n == "offset" else 0.0 for n in model.names]
+    sizes = np.maximum(np.maximum(np.abs(model.values), like), model.standard_errors / LARGEST_BIAS)
+    wild = [n for n, b, s in zip(model.names, bias, sizes, strict=True) if abs(b) > LARGEST_BIAS * s]
     if wild:
         told = f"not taken off: more than {100 * LARGEST_BIAS:g} % of {', '.join(wild)}"
         told += "; the intervals hold it"
-        return replace(less, bias_told=told, covariance=model.covariance + np.outer(bias, bias))
-    moved = _by_direction(model, again)
+        return replace(less, bias_told=told).wider(bias)
     singles = zip(model.alone, again.alone, weighed, strict=False)
     less = replace(
         less,
         values=less.values - bias,
-        covariance=wider_covariance(weighed) + np.outer(moved, moved),
+        covariance=wider_covariance(weighed),
         alone=tuple(_alone(*each, partial(default_value, made, start=start), model) for each in singles),
-        bias={name: float(b) for name, b in zip(model.names, bias, strict=True)},
+        bias=dict(zip(model.names, bias.tolist(), strict=True)),
         bias_told="found on records simulated with the result, and taken off",
     )
-    return with_scatter(start, less)
+    return with_scatter(start, less.wider(_by_direction(model, again)))
 
 
 def with_noise(model: JointModel, again: JointModel) -> tuple[RecordFit, ...]:
@@ -221,12 +221,3 @@ def in_counts(values: Floats, recorded: Floats) -> Floats:
         return values
     count = float(np.sum(steps) / np.sum(many))
     return np.asarray(levels[0] + count * np.floor((values - levels[0]) / count + ROUNDING))
-
-
-def _sizes(model: JointModel) -> np.ndarray:
-    """What a bias is held against: the value or, where it may be zero, that of its kind or its error."""
-    gravity = math.hypot(model.get("gravity_sin", 0.0), model.get("gravity_cos", 0.0))
-    dry = next((abs(model[n]) for n in ("dry", "dry_forward", "map_0") if n in model), 0.0)
-    like = [gravity if n.startswith("gravity") else dry if n == "offset" else 0.0 for n in model.names]
-    errors = model.standard_errors / LARGEST_BIAS
-    return np.maximum(np.maximum(np.abs(model.values), like), errors)

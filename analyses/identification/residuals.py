@@ -12,9 +12,10 @@ from analyses.identification.joint_model import JointModel, RecordFit
 
 LEVEL = 0.01  # probability with which chance alone leaves the bound at one lag or more
 MOST_LAGS = 100
+NAMES = "whiteness", "independence"  # of the noise itself, of an input
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class ResidualTest:
     """Correlation of a record's innovations with an input, or (``whiteness``) with themselves.
 
@@ -78,13 +79,6 @@ def _of_record(part: RecordFit) -> Iterator[ResidualTest]:
         lags = both if of else both[reach + 1 :]
         e, u = white - white.mean(), x - x.mean()
         size, count = float(np.linalg.norm(e) * np.linalg.norm(u)) or 1.0, len(e)
-        products = correlate(e, u)[count - 1 + lags]
-        yield ResidualTest(
-            record=part.name,
-            name="independence" if of else "whiteness",
-            input=of,
-            lags=lags,
-            rows=count,
-            correlation=products / size,
-            bound=float(norm.isf(0.5 * (1.0 - (1.0 - LEVEL) ** (1.0 / len(lags)))) / np.sqrt(count)),
-        )
+        found = correlate(e, u)[count - 1 + lags] / size
+        bound = float(norm.isf(0.5 * (1.0 - (1.0 - LEVEL) ** (1.0 / len(lags)))) / np.sqrt(count))
+        yield ResidualTest(part.name, NAMES[bool(of)], of, lags, found, bound, count)

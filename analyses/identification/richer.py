@@ -13,7 +13,7 @@ FOLDS = 9
 STRIBECK_SPEEDS = 12
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class LawScore:
     """How well one law predicts runs that it was not fitted to."""
 
@@ -97,12 +97,5 @@ def _score(name: str, formula: str, parameters: int, base: Floats, errors: Float
     level = float(np.mean(base**2))
     saved = (base**2 - errors**2) / level if level > 0.0 else np.zeros(len(base))
     gain, std = float(np.mean(saved)), float(np.std(saved, ddof=1) / np.sqrt(len(saved)))
-    return LawScore(
-        name=name,
-        formula=formula,
-        parameters=parameters,
-        error_Nm=float(np.sqrt(np.mean(errors**2))),
-        gain=gain,
-        gain_std=std,
-        warranted=gain > max(2.0 * std, 0.05),
-    )
+    error, warranted = float(np.sqrt(np.mean(errors**2))), gain > max(2.0 * std, 0.05)
+    return LawScore(name, formula, parameters, error, gain, std, warranted)

@@ -39,9 +39,8 @@ def recipe_for(record: Record, cutoff_hz: float | None = None, decimation: int |
     """The published recipe, moved to another sampling period.
 
     100 Hz or a tenth of the sampling frequency, whichever is lower; decimated to the cut-off; 49 ms dropped
-    at both ends; differences over seven points, as three
-    would make the inertia too small by some tenths of a per cent; torques filtered as the position is. The
-    record of the EMPS benchmark has the published recipe to the letter, which keeps the end.
+    at both ends; differences over seven points, as three would make the inertia too small by some tenths of a
+    per cent; torques filtered as the position is. The record of the EMPS benchmark has the published recipe.
     """
     period = period_of(record)
     if cutoff_hz is None and decimation is None and is_benchmark(record):
@@ -52,15 +51,8 @@ def recipe_for(record: Record, cutoff_hz: float | None = None, decimation: int |
     factor = max(1, round(1.0 / (cutoff * period))) if decimation is None else decimation
     if factor < 1:
         raise InputError(f"decimation = {factor}: must be 1 or more")
-    skip = max(round(0.049 / period), 5)
-    return Recipe(
-        cutoff_hz=cutoff,
-        decimation=factor,
-        skip_samples=skip,
-        skip_end_samples=skip,
-        points=7,
-        both_sides=True,
-    )
+    skips = dict.fromkeys(("skip_samples", "skip_end_samples"), max(round(0.049 / period), 5))
+    return Recipe(cutoff_hz=cutoff, decimation=factor, **skips, points=7, both_sides=True)
 
 
 def is_benchmark(record: Record) -> bool:
@@ -192,23 +184,22 @@ def record_rows(
     """
     record, shared = prepared(record), design
     design, period = record.drive(shared), period_of(record)
-    _check(record, gravity and design.load.path != "back-drivable")
+    if too_short(record):
+        lasts = f"lasts {len(record) * period:.3g} s in {len(record)} rows"
+        told = f"{lasts}: {SHORTEST_S:g} s and more are needed; is the unit of the time right?"
+        raise InputError(told, where=record.name)
+    if gravity and design.load.path != "back-drivable":
+        told = 'load.path = "self-locking": gravity does not turn the motor; "back-drivable" is meant'
+        raise InputError(told)
     recipe = recipe_for(record) if recipe is None else recipe
     own = _balance(design, record, recipe, gravity=gravity)
     motion, angle = own.motion, own.angle
     filtered = partial(recipe.other_side, period_s=period)
     names, columns = friction_columns(motion, form, knots_rad_s, filtered)
     turned = angle + pendulum_angle(shared)
-    others = [
-        np.sin(turned),
-        np.cos(turned),
-        motion.velocity,
-        filtered(np.sign(motion.velocity)),
-        own.known,
-        own.drive,
-    ]
+    turns = [np.sin(turned), np.cos(turned), motion.velocity, filtered(np.sign(motion.velocity))]
     part = recipe.part(len(motion.velocity))
-    rows = decimated(np.column_stack([columns, *others])[part], recipe.decimation)
+    rows = decimated(np.column_stack([columns, *turns, own.known, own.drive])[part], recipe.decimation)
     sine, cosine, speed, side, known, y = rows[:, columns.shape[1] :].T
     w = [*rows[:, : columns.shape[1]].T, np.abs(known if moment is None else known + moment) * side]
     names.append("load_coefficient")
@@ -237,7 +228,7 @@ def record_rows(
     )
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class _Balance:
     """The torques of a record's drive at every sample, less what the design knows of them."""
 
@@ -277,14 +268,16 @@ def _balance(design: Design, record: Record, recipe: Recipe, *, gravity: bool) -
         own = design.load_side_inertia_kgm2 / ratio * sides.motor.acceleration / ratio
         drive = drive - (np.asarray(sides.torque / ratio - own) if free else 0.0)
         told, used = f"{told}, {sides.told}", {**sides.used, **used}
-    return _Balance(
-        motion=motion, angle=angle, drive=drive, known=known, used=used, note=f"{place} and {told}"
-    )
+    return _Balance(motion, angle, drive, known, used, note=f"{place} and {told}")
 
 
 def _kept(record: Record, motion: Motion, part: slice, recipe: Recipe) -> Mask:
-    """Which decimated rows are used: no sample at rest, or left out, lies close by."""
-    moving = ~_at_rest(motion.velocity, period_of(record))
+    """Which decimated rows are used: no sample at rest, or left out, lies close by.
+
+    At rest, 30 ms or more below 0.5 % of the largest speed, the friction is not that of sliding.
+    """
+    slow = np.abs(motion.velocity) < REST_SHARE * float(np.max(np.abs(motion.velocity), initial=0.0))
+    moving = ~lasting(slow, max(round(REST_TIME_S / period_of(record)), 6))
     if record.left_out is not None:
         moving &= ~record.left_out
     near = 2 * recipe.decimation + 1
@@ -295,16 +288,6 @@ def _kept(record: Record, motion: Motion, part: slice, recipe: Recipe) -> Mask:
 def too_short(record: Record) -> bool:
     """Whether a record is refused for how long it lasts."""
     return len(record) * period_of(record) < SHORTEST_S and not is_benchmark(record)
-
-
-def _check(record: Record, locked: bool) -> None:
-    if too_short(record):
-        lasts = len(record) * period_of(record)
-        told = f"lasts {lasts:.3g} s in {len(record)} rows: {SHORTEST_S:g} s and more are needed"
-        raise InputError(f"{told}; is the unit of the time right?", where=record.name)
-    if locked:
-        told = 'load.path = "self-locking": gravity does not turn the motor; "back-drivable" is meant'
-        raise InputError(told)
 
 
 def _torque(design: Design, record: Record, motion: Motion, recipe: Recipe) -> tuple[Floats, str, str]:
@@ -332,9 +315,3 @@ def rows_under(design: Design, record: Record, model: JointModel) -> Rows:
     if not gravity:
         return rows
     return made(moment=model["gravity_sin"] * rows.sine + model["gravity_cos"] * rows.cosine)
-
-
-def _at_rest(velocity: Floats, period_s: float) -> Mask:
-    """Stretches of 30 ms or more below 0.5 % of the largest speed: the friction is not that of sliding."""
-    slow = np.abs(velocity) < REST_SHARE * float(np.max(np.abs(velocity), initial=0.0))
-    return lasting(slow, max(round(REST_TIME_S / period_s), 6))

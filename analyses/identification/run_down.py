@@ -12,11 +12,11 @@ from scipy.stats import f as variance_ratio
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
 from actuator_lti.types import Floats
-from analyses.estimation.fit import Fixed
+from analyses.estimation.fit import Fit, Fixed
 from analyses.estimation.least_squares import scaled_lstsq, told_apart, wider_covariance
 from analyses.estimation.parameters import default_value
 from analyses.identification.asked import Settings
-from analyses.identification.joint_model import NAMES, FrictionForm, JointModel, RecordFit
+from analyses.identification.joint_model import NAMES, FrictionForm, JointModel, RecordFit, Rows
 from analyses.identification.rows import (
     REST_SHARE,
     REST_TIME_S,
@@ -84,6 +84,21 @@ class Decay:
         made = self.step_s * np.cumsum(of_speed) if self.at_place else of_speed * (self.speed != 0.0)
         return np.asarray(made - self.begin @ scaled_lstsq(self.begin, made))
 
+    def part(self, rows: Rows, names: tuple[str, ...], values: Floats, inertia: float) -> RecordFit:
+        """The rows of its record: what each torque makes of what is recorded, times inertia over time."""
+        speed, acceleration, count = self.speed, self.acceleration, len(self.speed)
+        scale = (self.step_s * count) ** -(2.0 if self.at_place else 1.0)
+        shapes = {"inertia": acceleration, "viscous": speed, "offset": np.ones(count)}
+        shapes["dry"] = np.full(count, float(self.side))
+        table = scale * np.column_stack([self.answer(shapes[name.partition("_")[0]]) for name in names])
+        rest, inputs = scale * inertia * self.rest, np.column_stack([speed, acceleration])
+        more = {"residual": rest, "own_residual": rest, "noise": rest, "inputs": inputs}
+        more |= {"friction": rest - inertia * acceleration, "names": names, "w": table}
+        more |= {"y": table @ values + rest, "speed": speed, "acceleration": acceleration}
+        more |= {"step_s": self.step_s, "answer": lambda torque: scale * self.answer(torque)}
+        more |= dict.fromkeys(("keep", "compared"), np.ones(count, dtype=bool))
+        return RecordFit(**{**vars(rows), **more})
+
     @property
     def relative_error(self) -> float:
         """Norm of what is left over that of what friction takes."""
@@ -101,12 +116,12 @@ def decay_of(design: Design, record: Record, *, found: bool = True) -> Decay:
     seen = record[RATES[design.axis]] if place is None else place[1]
     speed = motion_of(design, record, recipe_for(record))[0].velocity
     side = 1 if float(np.sum(speed)) >= 0.0 else -1
-    time, speed, first = (
-        period * np.arange(len(seen)),
-        side * speed,
-        [] if place is None else [side * seen[0]],
-    )
-    if _moves_again(speed, period):
+    time, speed, most = period * np.arange(len(seen)), side * speed, float(np.max(np.abs(speed)))
+    first = [] if place is None else [side * seen[0]]
+    # what moves, for 30 ms or more at a tenth of the largest speed, has not stood or turned back before
+    far = lasting(np.abs(speed) > SLOW * most, max(round(REST_TIME_S / period), 6))
+    since, until = (np.logical_or.accumulate(far[::step])[::step] for step in (1, -1))
+    if np.any(speed[since & until] < REST_SHARE * most):
         told = "it moves again after it stood: a run-down is one decay, each a file of its own"
         raise InputError(told, where=record.name)
     moves = speed > SLOW * np.max(speed)
@@ -126,14 +141,15 @@ def decay_of(design: Design, record: Record, *, found: bool = True) -> Decay:
         w = np.where(time < stop, w0 - (p * w0 + q) * held, 0.0)
         return w, w if place is None else x[0] + w0 * held - q * (np.minimum(time, stop) - held) / p
 
+    def off(x: Floats) -> Floats:
+        return goes * (decay(x)[1] - side * seen)
+
     # at rest a position errs by one part of a count
     goes = moves | (decay(np.append(begin, about[1:]))[0] > 0.0)
     start = np.append(begin, given) if found else begin
     slope = np.array([float(np.mean(speed[moves])), 1.0])  # of the deceleration over both ratios
     with np.errstate(over="ignore", invalid="ignore"):  # where nothing tells them they grow without bound
-        solved = least_squares(
-            lambda x: goes * (decay(x)[1] - side * seen), start, method="lm", x_scale="jac"
-        )
+        solved = least_squares(off, start, method="lm", x_scale="jac")
         p, q = ratios = np.asarray(solved.x[len(begin) :] if found else given)
         w = decay(solved.x)[0]
         covariance = _covariance(solved.jac[goes], solved.fun[goes], len(begin))
@@ -151,14 +167,6 @@ def decay_of(design: Design, record: Record, *, found: bool = True) -> Decay:
         at_place=place is not None,
         step_s=period,
     )
-
-
-def _moves_again(speed: Floats, period_s: float) -> bool:
-    """Whether what moves, for 30 ms or more at a tenth of the largest speed, stood or turned back before."""
-    most = float(np.max(np.abs(speed)))
-    far = lasting(np.abs(speed) > SLOW * most, max(round(REST_TIME_S / period_s), 6))
-    since, until = (np.logical_or.accumulate(far[::step])[::step] for step in (1, -1))
-    return bool(np.any(speed[since & until] < REST_SHARE * most))
 
 
 def _covariance(slopes: Floats, rest: Floats, begin: int) -> Floats:
@@ -195,7 +203,11 @@ def fit_run_downs(
     found = tuple(free[k] for k in picked)
     values, covariance, condition = _solved(decays, table, found, own)
     total = own["inertia"] if inertia else float(values[found.index("inertia")])
-    values = _possible(found, values, total**2 * covariance)
+    # friction below zero within its error is none, and the others as expected beside that
+    fit = Fit(names=found, values=values, covariance=total**2 * covariance)
+    none = {name: 0.0 for name in found if name != "offset" and -2.0 * fit.std(name) <= fit[name] < 0.0}
+    expected = fit.at(none)
+    values = np.array([none[name] if name in none else expected[name] for name in found])
     fixed = {"load_coefficient": Fixed(value=design.friction.load_coefficient, reason=NO_LOAD)}
     fixed |= {name: Fixed(value=value, reason="fixed as asked") for name, value in held.items()}
     for each in left:
@@ -206,15 +218,14 @@ def fit_run_downs(
     for name in ["inertia"] if inertia else known:
         moves = dict(zip(found, (values / own[name]).tolist(), strict=True))
         fixed[name] = Fixed(value=own[name], reason=why, moves=moves)
-    parts = tuple(
-        _part(design, *pair, form, found, values, total) for pair in zip(records, decays, strict=True)
-    )
+    rows = [record_rows(design, record, form, None) for record in records]
+    parts = tuple(one.part(own, found, values, total) for one, own in zip(decays, rows, strict=True))
     drive, rest = (np.concatenate([getattr(part, name) for part in parts]) for name in ("y", "residual"))
     return JointModel(
         names=found,
         values=values,
-        white_errors=total * np.sqrt(np.diag(covariance)),
-        covariance=total**2 * covariance,
+        white_errors=fit.standard_errors,
+        covariance=fit.covariance,
         between={},
         fixed=fixed,
         relative_residual=float(np.linalg.norm(rest) / np.linalg.norm(drive)),
@@ -240,15 +251,6 @@ def _solved(
     return values, np.linalg.inv(weighed.T @ weighed), float(condition)
 
 
-def _possible(names: Sequence[str], values: Floats, covariance: Floats) -> Floats:
-    """The values; friction below zero within its error is none, and the others as expected beside that."""
-    least = -2.0 * np.sqrt(np.diag(covariance))
-    none = [k for k, name in enumerate(names) if name != "offset" and least[k] <= values[k] < 0.0]
-    moved = values - covariance[:, none] @ scaled_lstsq(covariance[np.ix_(none, none)], values[none])
-    moved[none] = 0.0
-    return moved
-
-
 def _balance(decays: Sequence[Decay], form: FrictionForm) -> Floats:
     """Coefficients of every name in ``p J - b = 0`` and ``q J - T = 0`` of each decay, two rows for each."""
     names = NAMES[form]
@@ -270,36 +272,3 @@ def _said(decays: Sequence[Decay], axis: str) -> str:
         for one, (p, q) in zip(decays, errors, strict=True)
     ]
     return f"a run-down shows friction over inertia alone, {'; '.join(each)}"
-
-
-def _part(
-    design: Design,
-    record: Record,
-    decay: Decay,
-    form: FrictionForm,
-    names: Sequence[str],
-    values: Floats,
-    inertia: float,
-) -> RecordFit:
-    """The rows of one record: what each torque makes of what is recorded, times inertia over time."""
-    rows, count = record_rows(design, record, form, None), len(record)
-    scale = (record.period_s * count) ** -(2.0 if decay.at_place else 1.0)
-    shapes = {"inertia": decay.acceleration, "viscous": decay.speed, "offset": np.ones(count)}
-    shapes["dry"] = np.full(count, float(decay.side))
-    table = scale * np.column_stack([decay.answer(shapes[name.partition("_")[0]]) for name in names])
-    rest, inputs = scale * inertia * decay.rest, np.column_stack([decay.speed, decay.acceleration])
-    more = {"residual": rest, "own_residual": rest, "noise": rest, "inputs": inputs}
-    every = np.ones(count, dtype=bool)
-    own = replace(
-        rows,
-        names=tuple(names),
-        w=table,
-        y=table @ values + rest,
-        speed=decay.speed,
-        acceleration=decay.acceleration,
-        step_s=record.period_s,
-        keep=every,
-        answer=lambda torque: scale * decay.answer(torque),
-    )
-    friction = -inertia * decay.acceleration + rest
-    return RecordFit(**vars(own), **more, friction=friction, compared=every)

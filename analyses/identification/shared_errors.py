@@ -15,10 +15,7 @@ LEVEL = 0.01  # probability of a false alarm in a campaign
 
 
 def shared_errors(
-    points: tuple[SteadyPoint, ...],
-    instruments: Instruments,
-    load_coefficient: float,
-    torque_constant_Nm_A: float,
+    points: tuple[SteadyPoint, ...], instruments: Instruments, load_coefficient: float, kM: float
 ) -> tuple[tuple[str, ...], Floats]:
     """Names of the shared errors, and what the bound of each adds to each run's torque, N m, (runs, errors).
 
@@ -34,7 +31,7 @@ def shared_errors(
     effects = {
         "current gain": instruments.current_gain * torque,
         "torque constant": instruments.torque_constant * torque,
-        "current offset": instruments.current_offset_A * torque_constant_Nm_A * direction,
+        "current offset": instruments.current_offset_A * kM * direction,
         "torque sensor at zero": -bound * used * (1.0 - share),
         "torque sensor at full scale": -bound * used * share,
     }

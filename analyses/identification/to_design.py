@@ -147,13 +147,10 @@ def _possible(design: Design, fit: Fit) -> Fit:
     The others are what the fit expects of them beside that (conditional mean), where they can be.
     """
     gone = [p for p in fit.names if fit[p] < 0.0 <= fit[p] + 2.0 * fit.std(p) and not _accepts(p, fit[p])]
-    names, c = tuple(path for path in fit.names if path not in gone), fit.covariance
-    stated = [path for path in gone if path in design.parameters]
-    k, g = ([fit.names.index(path) for path in these] for these in (names, stated))
-    off = np.array([parameter_value(design, path) - fit[path] for path in stated])
-    moved = fit.values[k] + c[np.ix_(k, g)] @ np.linalg.lstsq(c[np.ix_(g, g)], off, rcond=None)[0]
-    possible = all(_accepts(path, value) for path, value in zip(names, moved, strict=True))
-    return Fit(names=names, values=moved if possible else fit.values[k], covariance=c[np.ix_(k, k)])
+    own = {path: parameter_value(design, path) for path in gone if path in design.parameters}
+    rest = {path: path for path in fit.names if path not in gone}
+    moved = fit.renamed(rest | {path: path for path in own}).at(own)
+    return moved if all(_accepts(path, moved[path]) for path in rest) else fit.renamed(rest)
 
 
 def _accepts(path: str, value: float) -> bool:

@@ -54,7 +54,10 @@ def excited_lines(record: Record, names: tuple[str, ...], period_s: float) -> Li
         told = f"{periods} periods of {period_s:g} s after the first: at least {MIN_PERIODS}"
         raise InputError(told, where=record.name)
     start = len(record) - periods * samples
-    spectra = np.array([_spectrum(record[name][start:], periods, samples) for name in names])
+    blocks = np.array([record[name][start:].reshape(periods, samples) for name in names])
+    rates = (blocks[:, -1].mean(axis=1) - blocks[:, 0].mean(axis=1)) / max((periods - 1) * samples, 1)
+    straight = blocks.reshape(len(names), -1) - rates[:, None] * np.arange(periods * samples)
+    spectra = np.fft.rfft(straight) * (2.0 / (periods * samples))  # a line at every ``periods``-th place
     means, noise, freedom = _without_drift(spectra, periods, periods * samples)
     hertz, power = np.arange(1, means.shape[1] + 1) / period_s, np.abs(means[0]) ** 2
     largest = float(np.max(power, initial=0.0))
@@ -93,14 +96,6 @@ def _without_drift(spectra: Complexes, periods: int, samples: int) -> tuple[Comp
     own = (1.0 + np.sum(np.abs(inverse[:, 0]) ** 2, axis=-1)) / freedom
     noise = own[:, None, None] * np.einsum("akm,bkm->kab", rest, rest.conj())
     return spectra[:, places] - found[:, :, 0], noise, freedom
-
-
-def _spectrum(values: Floats, periods: int, samples: int) -> Complexes:
-    """Amplitudes of the whole record, a line at every ``periods``-th place; the mean rate is taken off."""
-    block = values[: periods * samples].reshape(periods, samples)
-    rate = (block[-1].mean() - block[0].mean()) / max((periods - 1) * samples, 1)
-    straight = rate * np.arange(periods * samples)
-    return np.asarray(np.fft.rfft(block.ravel() - straight) * (2.0 / (periods * samples)))
 
 
 def response(lines: Lines, k: int = 1) -> tuple[Complexes, Floats]:
@@ -249,8 +244,8 @@ def _scales(start: Mapping[str, float], names: tuple[str, ...]) -> Floats:
     size = {
         "damping": 0.01 * start["stiffness"] / natural,
         "viscous": 0.01 * start["motor_inertia"] * natural,
-        "load_viscous": 0.01 * start["load_inertia"] * natural,
     }
+    size["load_viscous"] = 0.01 * start["load_inertia"] * natural
     return np.array([max(abs(start.get(name, 0.0)), size.get(name, 0.0)) for name in names])
 
 

@@ -25,11 +25,7 @@ class RateLimited:
 
 
 def rate_limited(amplitude: float, omega_rad_s: float, rate_limit: float) -> RateLimited:
-    """Describing function of a pure rate limit (model.md section 5; between the regimes an accepted fit).
-
-    ``amplitude``: peak of the command.
-    ``rate_limit``: R, in the unit of the amplitude per second.
-    """
+    """Describing function of a pure rate limit (model.md section 5; between the regimes an accepted fit)."""
     x = omega_rad_s * amplitude / rate_limit
     if x <= 1.0:
         return RateLimited(x, "linear", 1.0, 0.0, amplitude)
@@ -95,11 +91,7 @@ def limiter_fractions(result: BatchResult) -> np.ndarray:
 def causes(
     result: BatchResult, linear: np.ndarray, amplitude_rad: np.ndarray, rubs: bool = True
 ) -> np.ndarray:
-    """Name what keeps each run from being linear (`CAUSE_RULE`); index into `CAUSES`.
-
-    ``linear`` is the response from command to output at each run's frequency; ``rubs`` says whether it is dry
-    friction that keeps a run from being linear.
-    """
+    """Index into `CAUSES` of what keeps each run from its ``linear`` response; friction if it ``rubs``."""
     fractions = limiter_fractions(result)
     conditions = {
         CAUSES.index("stiction"): result.window_stick_fraction >= STICK_FRACTION,

@@ -1,14 +1,10 @@
 """Conditional stability that a limit brings out: healthy margins, and yet a large command diverges.
 
-A loop with a lower gain margin goes unstable when gain is taken away, and a limit takes gain away.  The
-describing function of saturation says at which amplitude in front of the limit so much is gone that an
-oscillation keeps itself up (an unstable limit cycle: below it the oscillation dies out, above it grows).
-Whether the drive gets there is found in time, by steps of growing size.
-
-The describing function knows nothing of anti-windup: where the controller in front of the limit stops its
-integral while the limit acts (model.md section 2), the drive is safer than predicted.  A voltage limit behind
-a current loop is taken as the current limit U/R that it amounts to: the velocity controller does not know of
-it and goes on integrating.
+A limit takes gain away, under which a loop with a lower gain margin goes unstable. The describing function of
+saturation says from which amplitude in front of the limit on an oscillation grows; whether the drive gets
+there is found in time, by steps of growing size. It knows nothing of anti-windup (model.md section 2), with
+which the drive is safer. A voltage limit behind a current loop is taken as the current limit U/R: the
+velocity controller does not know of it and goes on integrating.
 """
 
 from dataclasses import dataclass
@@ -99,10 +95,7 @@ def saturation_ratio(gain: float) -> float:
 
 
 def conditional_stability(design: Design, loops: Loops) -> Conditional:
-    """Look for conditional stability: by margins, by describing functions, and by steps in time.
-
-    ``loops`` are sampled and sliding.
-    """
+    """Look for conditional stability of sampled sliding loops: margins, describing functions, steps."""
     margins = {point: exact_margins(loops, point) for point in wire(design).points if point != "output"}
     predictions = [
         _prediction(loops, point, margins[point].gain_lower, limit, limiter)
@@ -147,10 +140,7 @@ def _prediction(loops: Loops, point: str, gain: float, limit: float, limiter: st
 
 
 def _oscillation_hz(loop: PeriodicLoop, gain: float) -> float:
-    """At which frequency a loop oscillates at a gain that brings a pole to the unit circle.
-
-    A pole over M updates is that of M frequencies: the one at which ``gain L`` comes nearest to -1 is meant.
-    """
+    """Where a gain brings a pole to the circle; over M updates the one of M at which it is next to -1."""
     poles = loop.modes(gain)
     angle = abs(float(np.angle(poles[int(np.argmin(np.abs(np.abs(poles) - 1.0)))])))
     count = len(loop.systems)
@@ -180,11 +170,7 @@ def _to_output(design: Design, point: str, omega: float) -> float:
 
 
 def step_threshold(design: Design) -> tuple[float | None, float | None]:
-    """Largest step (rad, output) that settles, and smallest tried that does not, up to full deflection.
-
-    Steps of growing size are asked up to the first that does not settle, then those between it and the one
-    before. The first is 0 where not even the smallest tried settles; both ``None`` where all do.
-    """
+    """Largest step (rad, output) that settles, 0: none; smallest tried that does not; None: all settle."""
     full = design.validation.full_deflection_rad
     low, high = _first_unsettled(design, full * np.geomspace(SMALLEST_PART, LARGEST_PART, STEPS), None)
     if low == 0.0:
@@ -205,17 +191,18 @@ def _first_unsettled(design: Design, sizes_rad: Floats, beyond: float | None) ->
 
 
 def settles(design: Design, size_rad: float) -> bool:
-    """Whether no limit keeps a step from rest from coming to rest (`nonlinear.settling.rest`).
+    """Whether no limit keeps a step from coming to rest (`nonlinear.settling.rest`), or an accepted swing.
 
-    What stands because a limit holds it has not settled.  What moves on while no limit acts, or about as much
-    without any limit, is kept going by something else (dry friction, counts); a swing that a requirement
-    accepts is accepted here.
+    What moves on about as much without limits is kept going by something else (friction, counts).
     """
     rest = _ending(design, size_rad)
     if not _limits_of(rest) or (rest.verdict == "limit cycle" and rest.amplitude <= accepted_rad(design)):
         return True
-    if rest.verdict == "still moving" and _dies_out(design, size_rad, rest):
-        return True
+    if rest.verdict == "still moving":  # against a limit it dies out by a constant amount a period, no share
+        run = _halves(design, size_rad, 4.0 * rest.after_s).run()
+        late, early = (np.abs(np.array(run.span("output_angle_rad", k)) - size_rad).max() for k in (0, 1))
+        if run.ok[0] and late < LASTING * early:
+            return True
     without = judge(step_rows(design, 0.0, size_rad, limits_on=False).running())
     assert without is not None  # a step that stays
     return not without.comes_to_rest and rest.amplitude <= ABOUT * without.amplitude
@@ -225,16 +212,6 @@ def settles(design: Design, size_rad: float) -> bool:
 def _ending(design: Design, size_rad: float) -> Rest:
     """What a step ends in; those about the threshold are asked for again."""
     return settle(design, 0.0, size_rad).rest
-
-
-def _dies_out(design: Design, size_rad: float, rest: Rest) -> bool:
-    """Whether a motion that was followed in vain falls over four times that time.
-
-    A swing against a limit dies out by a constant amount a period, not by a share of itself.
-    """
-    run = _halves(design, size_rad, 4.0 * rest.after_s).run()
-    late, early = (np.abs(np.array(run.span("output_angle_rad", k)) - size_rad).max() for k in (0, 1))
-    return bool(run.ok[0] and late < LASTING * early)
 
 
 def _limits_of(rest: Rest) -> list[str]:

@@ -1,13 +1,9 @@
 """Motion that begins at rest under a command, or from a deviation that the drive is let go from.
 
-From rest dry friction has no small-signal gain: each frequency is commanded at a stated amplitude and
-compared twice, with the sliding loop, which cannot hold here, and with the describing-function operating
-point at the speed amplitude that was seen.
-
-Margins at small, medium and large amplitude, with dry friction and without: the drive is released from an
-initial deviation (angle, speed or current, a part of its full range), limits act, dry friction sticks. What
-is looked for is the gain or delay at which the oscillation that follows lasts. Saturation takes gain away,
-friction takes energy away: the limit found need not be the linear one. A finding with figures, no check.
+From rest dry friction has no small-signal gain: a sine is compared with the sliding loop, which cannot hold,
+and with the describing function at the speed that was seen. Margins by amplitude, with dry friction and
+without: let go from a part of its full range, limits acting, at which gain or delay does an oscillation last?
+Saturation takes gain away, friction energy: it need not be the linear one. A finding, no check.
 """
 
 from __future__ import annotations
@@ -26,8 +22,6 @@ from actuator_lti.drive.operating import Operating, holding_moment_Nm, level, ru
 from actuator_lti.drive.profile import command_mean
 from actuator_lti.drive.wiring import wire
 from actuator_lti.errors import InputError
-from actuator_lti.loops import Loops
-from actuator_lti.loops.limiters import onset
 from actuator_lti.loops.sampled import reference_to_output
 from actuator_lti.types import Compared, Complexes, Floats
 from analyses.large_signal.classify import limiter_fractions
@@ -47,14 +41,12 @@ class RestSweep(Compared):
 
     frequency_hz: Floats
     amplitude_rad: Floats  # shape (K,): command at the output shaft, peak
-    # Shape (K,): output over command: simulated; sliding loop; describing function at ``speed_rad_s`` (NaN
-    # where nothing moves)
+    # Shape (K,): output over command: simulated; sliding; describing function (NaN: nothing moves)
     measured: Complexes
     sliding: Complexes
     described: Complexes
     speed_rad_s: Floats  # shape (K,): amplitude of the motor speed that was seen
-    # Shape (K,): of the last window; distortion of the motor speed
-    stick_fraction: Floats
+    stick_fraction: Floats  # shape (K,): of the last window; distortion of the motor speed
     distortion: Floats
     unsteadiness: Floats
     limiter: tuple[str, ...]  # limit that acted in the last window, or empty
@@ -63,10 +55,7 @@ class RestSweep(Compared):
 def sweep_from_rest(
     design: Design, frequency_hz: npt.ArrayLike, amplitude_rad: npt.ArrayLike, settle_ticks: int
 ) -> RestSweep:
-    """Command sines from rest and compare with the describing function of dry friction, where there is some.
-
-    The amplitude is that of the command at the output, one for all or one a frequency, shape (K,).
-    """
+    """Command sines from rest, amplitudes at the output (K,), beside the describing function of friction."""
     tick_s, n = design.controller.period_s, design.controller.position_loop.every
     asked = np.atleast_1d(np.asarray(frequency_hz, dtype=float))
     if not (asked > 0.0).all() or not (asked < 0.5 / (n * tick_s)).all():
@@ -96,22 +85,12 @@ def sweep_from_rest(
 
 
 def _linear(design: Design, frequency_hz: Floats, speed_rad_s: float | None) -> Complexes:
-    """Command to output at frequencies; sliding, or described at a speed amplitude.
-
-    The output is looked at in every tick, as the simulator does; at the instants of the position loop the
-    answer is the same but for the images of a held signal.
-    """
+    """Command to output, seen in every tick as in the simulator; sliding, or described at a speed."""
     point = "sliding" if speed_rad_s is None else "describing-function"
     at = Operating(point=point, speed_amplitude_rad_s=speed_rad_s)  # type: ignore[arg-type]
     omega, mean = 2.0 * np.pi * frequency_hz, command_mean(design)
     response = response_at(reference_to_output(wire(design, at)), omega)
     return response if mean is None else response * mean.response(omega)
-
-
-def free_amplitude(design: Design, loops: Loops, frequency_hz: Floats, part: float) -> Floats:
-    """Command amplitude: a part of full deflection, at most half of what reaches a limit."""
-    full = design.validation.full_deflection_rad
-    return np.minimum(part * full, 0.5 * onset(loops, 2.0 * np.pi * frequency_hz).amplitude_rad)
 
 
 SIZES = {"small": 0.02, "medium": 0.2, "large": 1.0}  # of full deflection, speed, current
@@ -133,8 +112,7 @@ class AmplitudeMargin:
     part: float  # of the full deflection, speed or current
     friction_on: bool
     linear: float  # the linear margin (factor, or samples)
-    # Factor or samples; 1 (0) where the nominal drive oscillates already; ``None``: not up to ``furthest``
-    value: float | None
+    value: float | None  # 1 (0): the nominal drive oscillates already; None: not up to ``furthest``
     furthest: float
     period_s: float
     limiter: str = ""  # that acts longest while it lasts, just past the value; empty where none does
@@ -203,7 +181,15 @@ class _Release:
         self.kind, self.part, self.sizes = kind, part, full_range(design)
         setup, still = bench.setup(name), OperatingMotion(0.0, 0.0, 0.0, friction_on)
         if setup.outer != design.controller.outermost:
-            setup, still = replace(setup, design=level(setup.design)), _carrying(setup.design, still)
+            # The load's own moment as a constant, held: where it changes, it swings open outer loops
+            held, coupling = setup.design, setup.design.coupling
+            carried = holding_moment_Nm(held)
+            twist = (
+                0.0 if coupling is None else float(coupling.twist_rad(carried / held.ratio_behind_coupling))
+            )
+            extra = passed_moment_Nm(held, carried)
+            still = replace(still, load_Nm=-carried, twist_rad=twist, extra_Nm=extra)
+            setup = replace(setup, design=level(held))
         self.setup = replace(setup, bias=still, limits_on=True, held=False)
         tick_s = design.controller.period_s
         settling = min(settling_ticks_of(closed, self.setup.hold_ticks, design.name), MOST_SETTLING)
@@ -216,10 +202,7 @@ class _Release:
         self.too_long = VALUES * (self.wait + 2 * self.window) > TOO_MANY
 
     def lasting(self, value: float) -> tuple[str, float] | None:
-        """What limits the oscillation at a gain, or a delay in samples, and its amplitude at the output.
-
-        None where it does not last from the last window but one to the last.
-        """
+        """What limits an oscillation that lasts at a gain or delay (samples), its output; else None."""
         gain, delay = (value, 0.0) if self.kind == "gain" else (1.0, value)
         rows, outer = self.setup.rows(gain, delay), self.setup.outer
         start = {"position": "angle_start", "velocity": "speed_start", "current": "current_start"}
@@ -237,14 +220,6 @@ class _Release:
         shares = [float(result.window_limit_fraction(name)[0]) for name in LIMITERS]
         swing = 0.5 * float(np.ptp(result.span("output_angle_rad")))
         return LIMITERS[int(np.argmax(shares))] if max(shares) > 0.0 else "", swing
-
-
-def _carrying(design: Design, still: OperatingMotion) -> OperatingMotion:
-    """The load's own moment as a constant, held: where it changes, it swings a drive of open outer loops."""
-    carried, coupling = holding_moment_Nm(design), design.coupling
-    twist = 0.0 if coupling is None else coupling.twist_rad(carried / design.ratio_behind_coupling)
-    extra = passed_moment_Nm(design, carried)
-    return replace(still, load_Nm=-carried, twist_rad=float(twist), extra_Nm=extra)
 
 
 def _travel_s(design: Design, stage: str, part: float) -> float:

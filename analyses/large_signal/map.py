@@ -19,23 +19,16 @@ from actuator_lti.start.extras import need
 from actuator_lti.types import Compared
 from analyses.finite import finite
 from analyses.friction_effects.breakaway import static_threshold
+from analyses.large_signal import tones
 from analyses.large_signal.classify import CAUSES, WAVEFORMS, causes, limiter_fractions, not_linear, waveforms
-from analyses.large_signal.tones import (
-    MOST_TICKS,
-    amplitudes,
-    frequency_range_hz,
-    linear_steady_state,
-    run_tones,
-    tones,
-    work_ticks,
-)
+from analyses.large_signal.tones import MOST_TICKS, linear_steady_state, run_tones
 from analyses.linear.loop_survey import with_cogging
 
 if TYPE_CHECKING:
     import pandas
     from matplotlib.axes import Axes
 
-AMPLITUDES, FREQUENCIES = 17, 28
+COUNTS = 17, 28  # of amplitudes, of frequencies
 BELOW_ONSET = 0.95
 LONG = 0.1  # periods of the highest tone
 
@@ -55,9 +48,7 @@ class AmplitudeMap(Compared):
     unsteadiness: np.ndarray
     response: np.ndarray  # shape (a, f): fundamental of the output over the command
     linear: np.ndarray  # shape (f,): the same from the linear sampled loop, sliding
-    # Shape (f,): A_k(w) of each limiter from the linear loop, no load; without protection that is slow
-    # against the tones, which acts later than they are simulated (`slow_protection`)
-    onset_rad: Mapping[str, np.ndarray]
+    onset_rad: Mapping[str, np.ndarray]  # A_k(w) of each limiter, linear, no load; no `slow_protection`
     ticks: int  # simulated in all
     coarser: bool = False  # than asked for, as that would take more than `MOST_TICKS`
 
@@ -103,7 +94,7 @@ class AmplitudeMap(Compared):
 
 def amplitude_map(
     design: AnyDesign, loops: Loops, *, load_Nm: float = 0.0, friction_on: bool = True,
-    counts: tuple[int, int] = (AMPLITUDES, FREQUENCIES),
+    counts: tuple[int, int] = COUNTS,
 ) -> AmplitudeMap:  # fmt: skip
     """Simulate sines over amplitude and frequency and say what each shows.
 
@@ -113,12 +104,12 @@ def amplitude_map(
     design = as_design(design)
     finite_number("load_Nm", load_Nm)
     given = tuple(whole_number("counts", each, 2) for each in counts)
-    part = min(np.sqrt(MOST_TICKS / (given[0] * work_ticks(design, loops, given[1]))), 1.0)
+    part = min(np.sqrt(MOST_TICKS / (given[0] * tones.work_ticks(design, loops, given[1]))), 1.0)
     counts = max(int(part * given[0]), 2), max(int(part * given[1]), 2)
-    frequencies = tones(design, loops, counts[1])
+    frequencies = tones.tones(design, loops, counts[1])
     omega = np.array([t.omega_rad_s for t in frequencies])
     threshold = static_threshold(design, load_Nm).smallest_rad if friction_on else None
-    levels = amplitudes(design, counts[0], threshold or None)
+    levels = tones.amplitudes(design, counts[0], threshold or None)
     start = linear_steady_state(loops, omega)
     border, slow = with_cogging(loops, onset(loops, omega)), slow_protection(design, loops)
     which = np.tile(np.arange(len(omega)), len(levels))
@@ -155,7 +146,7 @@ def slow_protection(design: Design, loops: Loops) -> list[str]:
     limits = design.limits
     if limits.peak_time_s is None or limits.overload_time_s is None:
         return []
-    return ["overload"] if limits.overload_time_s * frequency_range_hz(design, loops)[1] > LONG else []
+    return ["overload"] if limits.overload_time_s * tones.frequency_range_hz(design, loops)[1] > LONG else []
 
 
 FINE = 64  # points between two frequencies of the map, at which the linear response is known
@@ -181,8 +172,7 @@ class AmplitudeBode(Compared):
     # are not steady: a missing point is no value. -3 dB is 1/sqrt(2) of the linear gain at zero frequency
     minus3db_hz: np.ndarray
     minus90deg_hz: np.ndarray
-    # Shape (a, 2): Between which frequencies of the map the gain first falls through -3 dB, as far as steady
-    # points tell: from 0 where the first of them is below already, to inf where none is
+    # Shape (a, 2): steady frequencies between which it first falls; from 0 if the first is below, to inf
     minus3db_range_hz: np.ndarray
     below_from_start: np.ndarray  # shape (a,): below -3 dB at the whole frequency already
     linear_minus3db_hz: float | None

@@ -17,14 +17,7 @@ from actuator_lti.loops import Loops, assemble_loops
 from actuator_lti.loops.assemble import loops_at
 from actuator_lti.loops.limiters import onset
 from analyses.large_signal.classify import limiter_fractions
-from analyses.large_signal.map import (
-    AMPLITUDES,
-    FREQUENCIES,
-    AmplitudeBode,
-    AmplitudeMap,
-    amplitude_bode,
-    amplitude_map,
-)
+from analyses.large_signal.map import COUNTS, AmplitudeBode, AmplitudeMap, amplitude_bode, amplitude_map
 from analyses.large_signal.sawtooth import Sawtooth, sawtooth
 from analyses.large_signal.tones import DECAY, MOST_TICKS, linear_steady_state, run_tones, tones, work_ticks
 from analyses.linear.responses import response_at
@@ -43,8 +36,7 @@ class LimitShift:
     """Amplitude at which a limit first acts, linear and simulated with friction, at each frequency."""
 
     frequency_hz: np.ndarray  # shape (f,)
-    # Shape (f,): smallest A_k(w); what the simulation shows. NaN where no limit acts within the range tried,
-    # or where nothing limits
+    # Shape (f,): smallest A_k(w); what is simulated; NaN where none acts within the range tried
     linear_rad: np.ndarray
     simulated_rad: np.ndarray
     linear_limiter: tuple[str, ...]  # empty where there is none
@@ -62,10 +54,9 @@ class LimitShift:
 def limit_shift(design: Design, loops: Loops, count: int = COUNT) -> LimitShift | None:
     """Bisect the amplitude at which a limit first acts in steady state, at each of several frequencies.
 
-    Every run begins in the linear steady state just below the limit and is judged by its last window, so that
-    no start-up counts.  The command is taken as it comes behind its profile and filter.  ``None`` where the
-    loop is unstable, or nothing limits.  There are fewer than ``count`` frequencies, down to `LEAST`, where
-    those would take more than `MOST_TICKS`.
+    Begun in the linear steady state just below the limit, the command as behind its profile and filter.
+    ``None`` where the loop is unstable, or nothing limits. Fewer than ``count``, down to `LEAST`, where those
+    take more than `MOST_TICKS`.
     """
     given, design = loops, replace(design, command=Command())
     if loops.design.command != design.command:
@@ -105,11 +96,7 @@ def _command_gain(given: Loops, behind: Loops, omega_rad_s: np.ndarray) -> np.nd
 def _bisect(
     acting: Callable[[np.ndarray], np.ndarray], linear: np.ndarray, wanted: Sequence[str]
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Close in on the limit from both sides, all frequencies at once, on a logarithmic scale.
-
-    The limiter that acts is the one predicted, where it does: behind the limit a drive may swing against
-    another one for longer.
-    """
+    """Close in on the limit from both sides; the limiter is the predicted one, wherever that acts."""
     low, high = np.log(TRIED[0] * linear), np.log(TRIED[1] * linear)
     at_low, last = acting(np.exp(low)), acting(np.exp(high))
     valid = (at_low.max(axis=1) == 0.0) & (last.max(axis=1) > 0.0)
@@ -146,7 +133,7 @@ class LargeSignals:
 
 
 def large_signals(
-    design: AnyDesign, loops: Loops | None = None, *, counts: tuple[int, int] = (AMPLITUDES, FREQUENCIES)
+    design: AnyDesign, loops: Loops | None = None, *, counts: tuple[int, int] = COUNTS
 ) -> LargeSignals:
     """Look at large signals from every side (model.md section 5).
 

@@ -1,7 +1,4 @@
-"""Sines at many amplitudes and frequencies: which, simulated until settled, reduced to harmonics.
-
-They begin where the linear drive would be in steady state, so that no start-up hits a limit.
-"""
+"""Sines of many amplitudes and frequencies, begun in the linear steady state, run until they settle."""
 
 import math
 import re
@@ -103,11 +100,9 @@ def linear_steady_state(loops: Loops, omega_rad_s: np.ndarray) -> LinearSteadySt
 
 
 def triangle_start(design: Design, rows: Rows, amplitude_rad: np.ndarray, limited: np.ndarray) -> None:
-    """Begin sines far beyond the speed limit on the flank of the triangle that they end in.
+    """Begin sines that are ``limited`` and far beyond the speed limit on the flank of their triangle.
 
-    A triangle finds its mean only slowly, by a factor of about (x - 1)/(x + 1) each half period; from the
-    right place it need not.  Rows with ``x = w A/R`` below that of a full triangle, or not
-    ``limited``, stay as they are.
+    A triangle finds its mean only slowly, by a factor of about (x - 1)/(x + 1) each half period, x = w A/R.
     """
     limit = design.limits.speed_rad_s
     if design.controller.velocity is None or not limit < no_load_speed(design):
@@ -150,11 +145,7 @@ class Tone:
 def tone(
     frequency_hz: float, design: Design, least_updates: int = LEAST_UPDATES, least_cycles: int = 1
 ) -> Tone:
-    """Choose the tone next to a frequency; off by less than one update over the window.
-
-    Updates and periods of a window have no common factor, so that a sampled sinusoid is seen at as many
-    phases as there are updates: its largest sample is its peak to ``1 - cos(pi/updates)``.
-    """
+    """The tone next to a frequency: updates without a common factor with periods see as many phases."""
     every = design.controller.position_loop.every
     T = every * design.controller.period_s
     cycles = max(least_cycles, math.ceil(least_updates * frequency_hz * T))
@@ -180,21 +171,14 @@ def tones(design: Design, loops: Loops, count: int) -> tuple[Tone, ...]:
 
 
 def work_ticks(design: Design, loops: Loops, count: int) -> int:
-    """Ticks that one sine at each of so many tones takes, until it has settled and in two windows.
-
-    A tick of smoothed friction, which is integrated in steps, counts as three.
-    """
+    """Ticks that a sine at each of so many tones takes, two windows long; with smoothed friction thrice."""
     settling = linear_steady_state(loops, np.array([1.0])).settling_ticks
     each = 3 if design.friction.law == "tanh" else 1
     return each * sum(settling + 2 * tone.ticks for tone in tones(design, loops, count))
 
 
 def amplitudes(design: Design, count: int, smallest_rad: float | None) -> np.ndarray:
-    """Give command amplitudes up to full deflection, among them those that the design asks for.
-
-    ``smallest_rad``: command that just overcomes dry friction at once; the range begins at twice that, within
-    1/20000 to 1/200 of full deflection.
-    """
+    """Command amplitudes up to full deflection, with the design's own, from twice ``smallest_rad`` on."""
     full = design.validation.full_deflection_rad
     wanted = sorted({fraction * full for fraction in design.validation.amplitude_fractions})
     top = max(full, wanted[-1])

@@ -1,11 +1,8 @@
 """What the counts of an encoder do, beside the small signals, which are measured without them.
 
-The motor's counts are seen in the speed made of them (model.md section 2), the output's in its position,
-and in a speed made of it.  Four things: a standing error, ripple at constant speed, a limit cycle about the
-edge of a count (by describing function and in the simulator), and the amplitude from which the loop is linear
-again.
-
-An angle of amplitude A about a bias d, counted in steps q, has the fundamental ``n(A/q, d) A`` with
+A standing error, ripple at constant speed, a limit cycle about the edge of a count, and the amplitude from
+which the loop is linear again. An angle of amplitude A about a bias d, counted in steps q, has the
+fundamental ``n(A/q, d) A`` with
 
     n = (2 q/(pi A)) sum_k sqrt(1 - ((k + d) q/A)^2),  all k with |k + d| q < A.
 """
@@ -44,18 +41,13 @@ class Counts:
 
     sensor: Sensor
     quantum_rad: float  # one count, at the sensor's shaft
-    # Error of the output that a count may leave: the output's own count; the motor's leaves none
-    standing_rad: float
-    # What a step of the drive as it is ends with, less what it ends with without counts
-    standing_seen_rad: float
-    # By which a speed made of counts jumps (motor side); ``None`` where the speed is not made of them
-    speed_step_rad_s: float | None
-    # Largest ripple of the motor's speed (peak) that counts add at constant speed, and that speed
-    ripple_rad_s: float
+    standing_rad: float  # error of the output that its own count may leave; the motor's leaves none
+    standing_seen_rad: float  # what a step ends with, less what it ends with without counts
+    speed_step_rad_s: float | None  # by which a speed made of counts jumps (motor side), if it is
+    ripple_rad_s: float  # largest (peak) that counts add to a constant speed of the motor; which
     ripple_at_rad_s: float
     cycles: tuple[Confirmation, ...]  # foreseen limit cycles, each with what the simulator says of it
-    # Amplitude at the sensor from which the gain of the counts is 1 within 5 %, about any bias
-    linear_rad: float
+    linear_rad: float  # at the sensor, from which the gain of counts is 1 within 5 %, about any bias
     # Smallest amplitude tried from which the response to the command, at the bandwidth, is off by less than 5
     # % in the simulator: more, where counts shake the drive. ``None``: none up to 256 times as much, or the
     # drive is unstable without friction
@@ -84,10 +76,10 @@ def linear_ratio() -> float:
 def counts_of(design: Design, loops: Loops, settle_ticks: int) -> tuple[Counts, ...]:
     """Look at every encoder whose counts a loop sees, of a position drive that settles in so many ticks."""
     causes = (cause for cause in reversed(describing.SENSORS) if describing.counts_matter(design, cause))
-    return tuple(_one(design, loops, cause, settle_ticks) for cause in causes)
+    return tuple(_counts(design, loops, cause, settle_ticks) for cause in causes)
 
 
-def _one(design: Design, loops: Loops, cause: describing.Cause, settle_ticks: int) -> Counts:
+def _counts(design: Design, loops: Loops, cause: describing.Cause, settle_ticks: int) -> Counts:
     sensor, other = describing.SENSORS[cause]
     quantum, velocity = describing.quantum_of(design, cause) or 0.0, design.controller.velocity
     to_motor = design.total_ratio if sensor == "output" else 1.0
@@ -98,11 +90,13 @@ def _one(design: Design, loops: Loops, cause: describing.Cause, settle_ticks: in
     off = _linearity(alone, ideal, loops, linear / to_output, settle_ticks)
     good = np.logical_and.accumulate((off <= WITHIN)[::-1])[::-1]  # here and at all that is larger
     made_of = velocity is not None and velocity.sensor == sensor and design.encoder.speed == "difference"
+    step = min(design.validation.amplitude_fractions) * design.validation.full_deflection_rad
+    counted, smooth = (abs(settle(one, 0.0, step).rest.error) for one in (alone, ideal))
     return Counts(
         sensor=sensor,
         quantum_rad=quantum,
         standing_rad=quantum if sensor == "output" else 0.0,
-        standing_seen_rad=_standing(alone, ideal),
+        standing_seen_rad=abs(counted - smooth),
         speed_step_rad_s=quantum * to_motor / _span_s(design) if made_of else None,  # q/(m T)
         ripple_rad_s=ripple,
         ripple_at_rad_s=at,
@@ -137,13 +131,6 @@ def _ripple(design: Design, ideal: Design, count_rad: float, settle_ticks: int) 
     added = found[0] - found[1]
     k = int(np.argmax(added))
     return max(float(added[k]), 0.0), float(speeds[k])
-
-
-def _standing(design: Design, ideal: Design) -> float:
-    """Error that counts leave after a step."""
-    size = min(design.validation.amplitude_fractions) * design.validation.full_deflection_rad
-    counted, smooth = (abs(settle(one, 0.0, size).rest.error) for one in (design, ideal))
-    return abs(counted - smooth)
 
 
 def _linearity(design: Design, ideal: Design, loops: Loops, output_rad: float, settle_ticks: int) -> Floats:

@@ -2,17 +2,11 @@
 
 A cycle is predicted where an oscillating eigenvalue of the whole closed loop lies on the unit circle.
 
-Play: the coupling's torque is a dead zone of the twist.  For a twist of amplitude A its fundamental is that
-of the coupling with k and c times ``n(x) = 1 - (2/pi)(asin x + x sqrt(1 - x^2))``, x = b/A (the damping acts
-in contact only, and its share is the same n).
-
-Dry friction adds the slope ``4 Tc/(pi W)``, W the amplitude of its speed in the same cycle. The breakaway
-torque has no part in it: at rest a sinusoid spends no time. In cycles of play friction by load is left out.
-
-Quantisation: an angle that swings about the edge of a count is a relay of one count, ``2 q/(pi A)`` up to
-A = q.  The sensor multiplies the loop that it stands in by it (the output's that of the position, the
-motor's that of the speed made of it), so a cycle is predicted at the gain g that brings this loop to its
-border: ``A = 2 q/(pi g)``, stable.
+Play: the torque's fundamental is that of the coupling with k and c times ``n(x) = 1 - (2/pi)(asin x + x
+sqrt(1 - x^2))``, x = b/A. Dry friction: the slope ``4 Tc/(pi W)``, W the amplitude of its speed; none of
+breakaway, at which a sinusoid spends no time, and in cycles of play none by load. Quantisation: an angle that
+swings about the edge of a count is a relay, ``2 q/(pi A)`` up to A = q; the loop of its sensor (the motor's:
+of the speed made of it) has the cycle at the gain g that brings it to its border: ``A = 2 q/(pi g)``, stable.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -56,9 +50,7 @@ class Cycle:
     cause: Cause  # quantisation: of the output's sensor, or of the motor's
     with_friction: bool  # whether the drive's dry friction, by its own describing function, is in it
     output_rad: float  # amplitude of the output, peak
-    # Amplitude of what the nonlinearity sees: the twist at the coupling, the sensor's angle, or the motor's
-    # speed (rad/s)
-    inner_rad: float
+    inner_rad: float  # what the nonlinearity sees: twist, sensor's angle, motor's speed (rad/s)
     frequency_hz: float
     stable: bool  # whether motion near it comes nearer; ``False``: the border between dying out and growing
     state: dict[str, complex]  # its shape by state of the loop, at this amplitude
@@ -236,10 +228,7 @@ def counts_matter(design: Design, cause: Cause) -> bool:
 
 
 def cycles_of_quantisation(design: Design, causes: Iterable[Cause] = tuple(SENSORS)) -> tuple[Cycle, ...]:
-    """The cycles about the edge of a count of each sensor, friction left out.
-
-    There is one where the loop needs the gain ``2 q/(pi A)`` of its counts to keep it up.
-    """
+    """The cycles about the edge of a count of each sensor, which the gain ``2 q/(pi A)`` keeps up."""
     free, found = without_nonlinearities(design), []
     for cause in causes:
         if not counts_matter(design, cause):
@@ -256,8 +245,7 @@ def cycles_of_quantisation(design: Design, causes: Iterable[Cause] = tuple(SENSO
 def _border_at_output(free: Design) -> tuple[float, Mode] | None:
     """Gain of a sensor at the output that brings the loop to its border, and the oscillation there.
 
-    Where the speed is made of that angle too, all that is behind it goes through the velocity controller: its
-    loop is that at this controller's output.
+    A speed made of that angle too makes the loop that at the velocity controller's output.
     """
     control, point = free.controller, "output"
     velocity = control.velocity
@@ -273,10 +261,7 @@ def _border_at_output(free: Design) -> tuple[float, Mode] | None:
 
 
 def _border_of_speed(free: Design) -> tuple[float, Mode] | None:
-    """Gain of the speed made of the motor's angle that brings the loop to its border.
-
-    It is met once in a tick, so every entry of a tick's matrix has it to the first power.
-    """
+    """Gain of a speed made of the motor's angle, linear in a tick, that brings the loop to its border."""
     velocity = free.controller.velocity
     assert velocity is not None
     programs = []

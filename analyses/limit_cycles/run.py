@@ -54,8 +54,7 @@ class LimitCycles:
 
     design: Design
     confirmations: tuple[Confirmation, ...]  # every predicted cycle
-    # Steps of several sizes, without load and at every load of the design, waited for
-    rests: tuple[Settling, ...]
+    rests: tuple[Settling, ...]  # steps of several sizes, with every load, waited for
     looked_for: tuple[str, ...]  # the causes that the design has
 
     @property
@@ -95,10 +94,7 @@ def limit_cycles(design: AnyDesign) -> LimitCycles:
 
 
 def confirm(design: Design, cycle: describing.Cycle) -> Confirmation:
-    """Start in the cycle's shape at many sizes; find where motion turns from growing to dying out, or back.
-
-    Of several such sizes the one nearest to the predicted counts.
-    """
+    """Start in the cycle's shape at many sizes; find the nearest at which motion begins to grow or die."""
     tried = _tried(design, cycle)
     period = 1.0 / (cycle.frequency_hz * design.controller.period_s)  # ticks
     if CYCLES_WATCHED * period * len(SCALES) > BATCH_TICKS.most:

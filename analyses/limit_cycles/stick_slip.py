@@ -29,8 +29,7 @@ class StickSlipCycle:
     output_amplitude_rad: float  # error at rest on either side, output side
     frequency_hz: float
     rest_s: float  # of half a period
-    # Change of the size of the next error with that of this one; below 1 in magnitude the cycle attracts
-    slope: float
+    slope: float  # of the next error over this; below 1 in magnitude the cycle attracts
 
     @property
     def stable(self) -> bool:
@@ -51,10 +50,7 @@ class _Slip:
     command: np.ndarray
 
     def from_error(self, error: float) -> tuple[float, float, float] | None:
-        """Error after the slip (in the direction of the start), duration, and rest until the next breakaway.
-
-        ``None`` where the speed does not return to zero in time.
-        """
+        """Error after the slip in its direction, duration, rest until the next; None: it does not end."""
         w = self.w[0] + error * self.w[1]
         ends = np.flatnonzero((w[1:-1] > 0.0) & (w[2:] <= 0.0)) + 1
         if not ends.size:
@@ -73,11 +69,7 @@ class _Slip:
 
 
 def stick_slip_cycle(design: Design, load_Nm: float, loops: Loops | None = None) -> StickSlipCycle | None:
-    """Find the symmetric stick-slip cycle of a drive whose speed controller integrates.
-
-    ``None`` where there is none: every slip stops short of the other side, or ends at a smaller error.
-    ``loops`` are sampled and sliding, of this design, if they are there already.
-    """
+    """The symmetric cycle of an integrating speed controller, by its sampled sliding ``loops``, if any."""
     if (slip := _slip(design, load_Nm, loops)) is None:
         return None
     grid = slip.start / slip.gain * np.geomspace(SMALLEST, LARGEST, POINTS)
@@ -102,10 +94,7 @@ def stick_slip_cycle(design: Design, load_Nm: float, loops: Loops | None = None)
 
 
 def _slip(design: Design, load_Nm: float, loops: Loops | None) -> _Slip | None:
-    """Follow the slip after breakaway in the linear loop; ``None`` where this cycle cannot be.
-
-    The slip has to be that of the linear loop, with a constant sliding friction alike either way.
-    """
+    """Follow the slip after breakaway; None: not that of the linear loop with one constant friction."""
     control, friction = design.controller, design.friction
     velocity, plain = control.velocity, control.own_law is None  # what such a law does meanwhile is not known
     alike = friction.dry_torque_reverse_Nm is None and friction.offset_torque_Nm == 0.0

@@ -27,7 +27,7 @@ from actuator_lti.loops.assemble import loops_at
 from actuator_lti.loops.commanded import commanded_bandwidth, commanded_step
 from actuator_lti.margins import StabilityMargins, stability_margins
 from actuator_lti.step import StepFigures, step_figures
-from actuator_lti.systems.plain_system import as_control
+from actuator_lti.systems.as_control import as_control
 from analyses.isolation import attempt
 
 HELD = {"current": "rotor locked", "velocity": "load moment held"}

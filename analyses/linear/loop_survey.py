@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING, Any
@@ -121,11 +121,7 @@ def survey_loops(design: AnyDesign, progress: Progress = None) -> LoopSurvey:
     Raises `InputError`, `NumericalError`: as `assemble_loops` and `loop_figures`; inside
     `analyses.isolation.isolated` only of the sampled loops: what else fails is left out and noted.
     """
-
-    def step(done: int) -> None:
-        if progress is not None:
-            progress(done, 6)
-
+    tell: Any = progress or (lambda done, of: None)
     design = as_design(design)
     loops = assemble_loops(design)
     refused, sampled = list[str](), all_loop_figures(loops, certify=True, locked=True)
@@ -133,19 +129,18 @@ def survey_loops(design: AnyDesign, progress: Progress = None) -> LoopSurvey:
     for form in () if design.controller.sampled_only else FORMS[1:]:
         other = attempt(f"{form} form", partial(_other_form, design, form, refused), None)
         forms |= {} if other is None else {form: other}
-    step(2)
-    break_points: dict[str, BreakPoint] = attempt(
-        "loops at the break points",
-        lambda: {name: _break_point(loops, name) for name in loops.break_points},
-        {},
+    cuts, parts = loops.break_points, list[Any]()
+    asked: tuple[tuple[str, Callable[[], Any], Any], ...] = (
+        ("loops at the break points", lambda: {name: _break_point(loops, name) for name in cuts}, {}),
+        ("loops at the operating points", lambda: operating_points(design, refused), ()),
+        ("delay budgets", lambda: _budgets(design, sampled), {}),
+        ("limit of linear validity", lambda: _onset(loops, sampled), None),
     )
-    step(3)
-    points = attempt("loops at the operating points", lambda: operating_points(design, refused), ())
-    step(4)
-    budgets = attempt("delay budgets", lambda: _budgets(design, sampled), {})
-    step(5)
-    border = attempt("limit of linear validity", lambda: _onset(loops, sampled), None)
-    step(6)
+    for done, (what, part, without) in enumerate(asked, 2):
+        tell(done, 6)
+        parts.append(attempt(what, part, without))
+    tell(6, 6)
+    break_points, points, budgets, border = parts
     why = tuple(dict.fromkeys(refused))
     return LoopSurvey(design, loops, forms, break_points, points, budgets, border, why)
 

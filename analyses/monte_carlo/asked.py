@@ -54,10 +54,7 @@ class Asked(OnMachines):
 
 
 def study(design: Design, asked: Asked, *, out: Path, progress: Progress = None) -> MonteCarloResult | Design:
-    """The study, its samples kept in a folder of its own under ``out``; or the one sample that is asked for.
-
-    Raises `InputError`: if nothing has a tolerance, or what is asked is no study.
-    """
+    """The study, kept in a folder under ``out``, or the sample that is asked; `InputError`: no tolerance."""
     from actuator_lti.batch import variable_paths
     from analyses.monte_carlo.run import MonteCarloSettings, monte_carlo, sample_folder
     from analyses.monte_carlo.task import StepCheck, replay

@@ -1,8 +1,4 @@
-"""Requirements judged over columns of figures, and what a range of samples comes to, in bounded memory.
-
-Reductions of ranges merge into that of all of them, the same to the bit in whatever order; so each is made
-where its samples are computed, and its size does not grow with their number.
-"""
+"""Requirements over columns of figures; what samples come to, merged to the bit in any order."""
 
 from __future__ import annotations
 
@@ -80,11 +76,7 @@ def by_loop(design: Design) -> list[Requirement]:
 
 
 def in_populations(requirement: Requirement, design: Design) -> bool:
-    """Whether the figures of many designs at once have what a requirement is on.
-
-    They know the free rotor, and the response behind the profile's mean, through the filter; of a drive what
-    it has.
-    """
+    """Whether figures of many designs have it: they know the free rotor, and what is behind the mean."""
     quantity, command = QUANTITIES[requirement.quantity], design.command
     if quantity.scope == "drive":
         return not np.isnan(drive_figure(design, quantity.name, requirement.load_Nm or 0.0))

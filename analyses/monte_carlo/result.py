@@ -1,10 +1,8 @@
 """What a Monte Carlo study returns: distributions of figures, odds of requirements, worst cases.
 
-A column of any length is kept in a bounded number of bins. Floating-point numbers in their order are whole
-numbers in their order (the bits of a positive one read as an integer); a bin is all numbers whose first bits
-agree. As many last bits are dropped as it takes to have at most ``MOST`` bins occupied, none for up to
-``MOST`` different values. That number depends on the values alone, so sketches of parts merge into that of
-the whole, to the bit, in whatever order.
+A column is kept in at most ``MOST`` bins: the bits of a floating-point number in their order are a whole
+number in its order, and a bin is all numbers whose first bits agree, as many as it takes. That number depends
+on the values alone, so sketches of parts merge into that of the whole, to the bit, in whatever order.
 """
 
 from __future__ import annotations
@@ -41,19 +39,16 @@ class ColumnStatistics:
 
     name: str
     unit: str
-    # Samples in all; without the figure (unstable, no crossing to quote); where it is infinite (no limit)
-    count: int
+    count: int  # in all; then without the figure; where it is infinite (no limit)
     missing: int
     infinite: int
-    # Of the finite values
-    mean: float
+    mean: float  # of the finite values, as the next
     std: float
     minimum: float
     maximum: float
     shares: tuple[float, ...]
     quantiles: tuple[float, ...]
-    # Histogram of the finite values
-    edges: tuple[float, ...]
+    edges: tuple[float, ...]  # histogram of the finite values
     counts: tuple[int, ...]
 
 
@@ -107,8 +102,7 @@ class Sketch:
     missing: int = 0
     low: int = 0
     high: int = 0
-    # Without a finite value infinities the wrong way round
-    minimum: float = math.inf
+    minimum: float = math.inf  # without a finite value the wrong way round
     maximum: float = -math.inf
 
     @classmethod
@@ -186,22 +180,17 @@ def _bounded(dropped: int, keys: np.ndarray, counts: np.ndarray) -> tuple[int, n
 class Odds:
     """How often a requirement is met within the tolerances."""
 
-    # Of the requirement; ``"all"`` for all of them together
-    id: str
+    id: str  # of the requirement; ``"all"`` for all of them together
     label: str
     unit: str
     passed: int
     count: int
-    # Share of passes, and its lower and upper bound, each with 95 % confidence (Clopper and Pearson; on the
-    # safe side for Sobol points)
-    probability: float
+    probability: float  # share of passes; its bounds of 95 % (Clopper and Pearson; safe for Sobol points)
     low: float
     high: float
-    # The limit
-    minimum: float | None = None
+    minimum: float | None = None  # the limit
     maximum: float | None = None
-    # Value of the nominal design, and the worst of all samples
-    nominal: float | None = None
+    nominal: float | None = None  # value of the nominal design; the worst of all samples
     worst: float | None = None
     worst_sample: int | None = None  # its number
     columns: tuple[str, ...] = ()  # columns that the requirement looks at
@@ -214,8 +203,7 @@ class WorstCase:
 
     requirement: str
     unit: str
-    # Worst of all samples, and its number
-    sampled: float | None
+    sampled: float | None  # worst of all samples, and its number
     sample: int
     value: float | None  # after the optimiser; ``None`` where a loop is unstable there
     distance: float | None  # to the limit, positive where it is still met; ``None`` where unstable
@@ -231,11 +219,9 @@ class Driver:
 
     column: str
     path: str
-    # Ends of the parameter's range (three standard deviations of a normal one), SI
-    low_value: float
+    low_value: float  # ends of its range (three standard deviations of a normal one), SI
     high_value: float
-    # The figure there, in its unit; ``None`` where there is none
-    low: float | None
+    low: float | None  # the figure there, in its unit; ``None`` where there is none
     high: float | None
 
     @property
@@ -256,20 +242,16 @@ class MonteCarloResult:
     seed: int
     paths: tuple[str, ...]  # parameters that varied
     columns: Mapping[str, ColumnStatistics]
-    # One a requirement, in the order of the design file; then all together (id ``"all"``)
-    odds: tuple[Odds, ...]
+    odds: tuple[Odds, ...]  # one a requirement, as in the file; then all together (id ``"all"``)
     worst: tuple[WorstCase, ...]
     folder: Path  # every sample as Parquet, up to `KEPT`; the worst designs
     nominal: Mapping[str, float]  # the figures of the nominal design, by column
-    # Requirements that are not sampled, as each takes a computation of one design: not met where the nominal
-    # design fails, or else not proven
-    left_out: tuple[RequirementVerdict, ...] = ()
+    left_out: tuple[RequirementVerdict, ...] = ()  # not sampled: not met by the nominal design, or not proven
     # Probability of meeting a requirement, with 95 % confidence, that is enough; without it every sample and
     # the worst case have to (where none was sought, so many samples that they prove `PROVEN_SHARE`)
     at_least: float | None = None
     notes: tuple[str, ...] = ()
-    # For each figure that a requirement looks at, every tolerance alone, the one that moves it most first
-    drivers: tuple[Driver, ...] = ()
+    drivers: tuple[Driver, ...] = ()  # of each required figure every tolerance alone, the strongest first
     load_unit: str = "N m"  # of the loads in the names of columns
 
     @property

@@ -48,8 +48,7 @@ class MonteCarloSettings:
 
     samples: int = 10_000
     seed: int = 0
-    # Of the linear loops
-    operating_point: OperatingPoint = "sliding"
+    operating_point: OperatingPoint = "sliding"  # of the linear loops, as the load
     load_Nm: float = 0.0
     step: StepCheck | None = None  # a nonlinear step of every sample
     table: Table | None = None  # samples from an identification instead of tolerances

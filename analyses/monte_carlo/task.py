@@ -1,8 +1,6 @@
 """What is computed for every sample: linear figures, static figures, a nonlinear step; where it is kept.
 
-On disk it is one Parquet file a chunk, and a manifest that says of what. A chunk appears under its name only
-when it is complete (written beside, synchronised, renamed); a run that is interrupted, killed included, goes
-on from the chunks that are there.
+On disk one Parquet file a chunk, there only when complete, and a manifest; a run that was ended goes on.
 """
 
 from __future__ import annotations
@@ -49,18 +47,21 @@ class Store:
 
     @classmethod
     def open(cls, folder: Path, identity: Mapping[str, Any], chunk: int = CHUNK) -> Store:
-        """Open a folder for a study, new or begun before; one that holds another study is refused.
-
-        ``identity`` is everything that decides the numbers (hashes, seed, settings), plain JSON.
-        """
+        """Open a folder for a study of this ``identity``, plain JSON; one that holds another is refused."""
         path = folder / "manifest.json"
         wanted = {"schema": SCHEMA, "version": VERSION, "identity": dict(identity)}
         if path.exists():
-            result = _read_manifest(path)
+            try:
+                result = json.loads(path.read_text(encoding="utf-8"))
+            except (OSError, ValueError) as error:
+                raise InputError(f"cannot be read: {error}", where=str(path)) from error
+            known = isinstance(result, dict) and isinstance(result.get("chunk"), int)
+            if not known or result["chunk"] < 1:
+                raise InputError("is no manifest of a study", where=str(path))
             if {key: result.get(key) for key in wanted} != wanted:
                 words = "holds another study (design, seed, settings or code); take another folder"
                 raise InputError(words, where=str(folder))
-            chunk = int(result["chunk"])
+            chunk = result["chunk"]
         text = json.dumps({**wanted, "chunk": chunk}, indent=1, sort_keys=True)
         return cls(folder, chunk, text.encode())
 
@@ -95,16 +96,6 @@ class Store:
         for chunk in self.chunks(total):
             part = pq.read_table(self.path(chunk), partitioning=None)
             yield {name: part.column(name).to_numpy() for name in part.column_names}
-
-
-def _read_manifest(path: Path) -> Tree:
-    try:
-        result = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
-        raise InputError(f"cannot be read: {error}", where=str(path)) from error
-    if not isinstance(result, dict) or not isinstance(result.get("chunk"), int) or result["chunk"] < 1:
-        raise InputError("is no manifest of a study", where=str(path))
-    return result
 
 
 def _whole(path: Path, count: int) -> bool:
@@ -144,11 +135,7 @@ STEP: Mapping[str, tuple[str, Callable[[BatchResult], np.ndarray]]] = {
     "current_limited": ("%", lambda run: 100.0 * run.limit_fraction("current")),
     "voltage_limited": ("%", lambda run: 100.0 * run.limit_fraction("voltage")),
 }
-"""Figures of a nonlinear step: unit, and how they are read.
-
-Rise, overshoot and settling against the command (missing where it is not reached); the error at the
-end in percent of it; shares of the time in which a limiter acted.
-"""
+"""Figures of a nonlinear step against its command: unit, and how they are read; shares are of the time."""
 
 
 def step_units() -> dict[str, str]:
@@ -179,8 +166,7 @@ class SampleTask:
 
     design: Design
     sampler: Sampler
-    # Of the linear loops
-    operating_point: OperatingPoint = "sliding"
+    operating_point: OperatingPoint = "sliding"  # of the linear loops, as the load
     load_Nm: float = 0.0
     loops: bool = True  # whether their figures are wanted
     time_figures: bool | Collection[str] = True  # of their steps, or of which loops

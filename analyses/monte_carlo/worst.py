@@ -1,9 +1,7 @@
 """The worst design in the tolerance region: corners, the worst samples, then differential evolution.
 
-Sampling alone finds no worst case: the chance that a point lands near a corner of a box of many dimensions is
-small.  The search starts from the corners and the worst samples, and never returns less bad than the worst of
-them.  Correlated parameters stay together (`Group`).  Storn and Price 1997
-(`scipy.optimize.differential_evolution`), then Nelder and Mead.
+Samples hardly land near a corner of many dimensions. Storn and Price 1997
+(`scipy.optimize.differential_evolution`), then Nelder and Mead; never less bad than where it starts.
 """
 
 from __future__ import annotations

@@ -266,8 +266,11 @@ def conduct(run: Trajectory, full_deflection_rad: float = 0.0) -> Conduct:
     if run.status != "ok":
         return Conduct(run.status, run.advice)
     rest = None if run.running is None else judge(run.running)
-    if rest is None:
-        return Conduct("following", _limited(run))
+    if rest is None:  # with the limits that acted, and for how much of it
+        acted = [
+            f"{name} {100.0 * use.fraction:.3g} %" for name, use in run.limits.items() if use.fraction > 0.0
+        ]
+        return Conduct("following", f"limited, of the time: {', '.join(acted)}" if acted else "")
     unit, factor = COMMAND_UNITS[run.axis, "velocity" if run.stage == "voltage" else run.stage]
     if run.stage == "position":
         rest = counted(rest, NOTICED * full_deflection_rad)
@@ -285,12 +288,6 @@ def conduct(run: Trajectory, full_deflection_rad: float = 0.0) -> Conduct:
     far = left > NEAR * np.abs([*run.followed, run.reference_rad[-1]]).max()
     later = f"after the run, which ends {factor * left:.3g} {unit} short of that" if far else ""
     return Conduct("comes to rest" if run.stage == "position" else "becomes steady", faint, later)
-
-
-def _limited(run: Trajectory) -> str:
-    """Which limits acted in a run, and for how much of it."""
-    acted = [f"{name} {100.0 * use.fraction:.3g} %" for name, use in run.limits.items() if use.fraction > 0.0]
-    return f"limited, of the time: {', '.join(acted)}" if acted else ""
 
 
 def summary(run: Trajectory, ended: Conduct) -> Tree:

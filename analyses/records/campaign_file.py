@@ -146,12 +146,12 @@ def _check(campaign: Campaign) -> None:
     if not campaign.runs:
         raise InputError("no [[run]] is listed", where=campaign.origin)
     CAMPAIGN_RUNS.check(len(campaign.runs), campaign.origin)
-    for identity, times in Counter(run.id for run in campaign.runs).items():
-        if times > 1:
-            raise InputError(f'run.id = "{identity}": given twice', where=campaign.origin)
-    for name in ("current", "speed"):
-        if name not in {signal.name for signal in campaign.drive.signals}:
-            raise InputError(f"drive.signals.{name}: is needed", where=campaign.origin)
+    identities = Counter(run.id for run in campaign.runs)
+    lacking = {"current", "speed"} - {signal.name for signal in campaign.drive.signals}
+    wrong = [f'run.id = "{identity}": given twice' for identity, times in identities.items() if times > 1]
+    wrong += [f"drive.signals.{name}: is needed" for name in sorted(lacking)]
+    if wrong:
+        raise InputError(wrong[0], where=campaign.origin)
 
 
 def _run(table: Table, folder: Path) -> RunEntry:

@@ -104,10 +104,10 @@ def import_campaign(campaign: Campaign, *, progress: Progress = None) -> Importe
     for k, entry in enumerate(campaign.runs, 1):
         try:
             drive, sensor = read_record(entry.drive, campaign.drive), None
-            if entry.sensor is not None and campaign.sensor is None:
-                told = f"run {entry.id} has a sensor file, but there is no [sensor]"
-                raise InputError(told, where=campaign.origin)
-            if entry.sensor is not None and campaign.sensor is not None:
+            if entry.sensor is not None:
+                if campaign.sensor is None:
+                    told = f"run {entry.id} has a sensor file, but there is no [sensor]"
+                    raise InputError(told, where=campaign.origin)
                 sensor = read_record(entry.sensor, campaign.sensor)
             runs.append(assemble_run(campaign, entry, drive, sensor))
         except InputError as error:
@@ -131,8 +131,7 @@ def assemble_run(campaign: Campaign, entry: RunEntry, drive: Record, sensor: Rec
         if sensor is None:
             raise InputError(f"run {entry.id}: no torque signal and no sensor file", where=campaign.origin)
         how = campaign.join
-        signals = {"first_signal": how.drive_signal, "second_signal": how.sensor_signal}
-        join = clock_join(drive, sensor, **signals, method=how.method, offset_s=entry.offset_s)
+        join = clock_join(drive, sensor, how, entry.offset_s)
         join = join if how.method == "given" else by_current(drive, sensor, join, how.sensor_signal)
         record = joined_by(drive, sensor, join)
     if not np.any(record["speed"]):

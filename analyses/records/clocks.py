@@ -10,7 +10,7 @@ from actuator_lti.errors import InputError
 from actuator_lti.types import Floats
 from analyses.estimation.means import best_lag, correlation_time
 from analyses.estimation.smoothing import without_noise
-from analyses.records.campaign_file import Method
+from analyses.records.campaign_file import Join
 from analyses.records.factors import named_factor
 from analyses.records.record import Record
 from analyses.records.single_rows import NORMAL
@@ -60,15 +60,7 @@ class Series(NamedTuple):
     values: Floats
 
 
-def clock_join(
-    first: Record,
-    second: Record,
-    *,
-    first_signal: str,
-    second_signal: str,
-    method: Method = "correlation",
-    offset_s: float | None = None,
-) -> ClockJoin:
+def clock_join(first: Record, second: Record, how: Join, offset_s: float | None = None) -> ClockJoin:
     """How a second recorder's time goes on that of the first (`joined_by` puts its signals there).
 
     Of the signals that show the shared happening, such as the motor's speed and the clutch's torque, only
@@ -78,19 +70,17 @@ def clock_join(
     together with the rate by least squares. As ``given``: ``offset_s``, the first clock's time at the
     second clock's zero.
     """
-    if method == "given":
+    names = how.drive_signal, how.sensor_signal
+    if how.method == "given":
         if offset_s is None:
             raise InputError('join method "given": needs an offset', where=second.name)
         join = ClockJoin(offset_s=offset_s)
-    elif method not in ("event", "correlation"):
-        raise InputError(f'join method "{method}": "event", "correlation" or "given"')
     else:
-        a = Series(first.time_s, np.abs(first[first_signal]))
-        b = Series(second.time_s, np.abs(second[second_signal]))
+        a, b = (Series(one.time_s, np.abs(one[n])) for one, n in zip((first, second), names, strict=True))
         where = f"{first.name} with {second.name}"
-        _check_durations(a, b, (first_signal, second_signal), where)
-        join = (_by_event if method == "event" else _by_correlation)(a, b, where)
-    return replace(join, method=method, first_signal=first_signal, second_signal=second_signal)
+        _check_durations(a, b, names, where)
+        join = (_by_event if how.method == "event" else _by_correlation)(a, b, where)
+    return replace(join, method=how.method, first_signal=names[0], second_signal=names[1])
 
 
 def joined_by(first: Record, second: Record, join: ClockJoin) -> Record:
@@ -141,19 +131,15 @@ def motion_events(time_s: Floats, magnitude: Floats) -> tuple[float, float] | No
 
 def _check_durations(a: Series, b: Series, names: tuple[str, str], where: str) -> None:
     """Refuse two records in which one happening lasts differently long: no clock is off by so much."""
-    span_a, span_b = (0.0 if one is None else one[1] for one in (motion_events(*a), motion_events(*b)))
-    if not (span_a > 0.0 and span_b > 0.0):
+    first, second = spans = np.array([(motion_events(*one) or (0.0, 0.0))[1] for one in (a, b)])
+    steps = np.array([np.median(np.diff(one.time_s)) for one in (a, b)])
+    if not np.all(spans) or abs(first / second - 1.0) <= RATE_SPREAD + 3.0 * np.max(steps / spans):
         return
-    ratio = span_a / span_b
-    step = max(float(np.median(np.diff(a.time_s))) / span_a, float(np.median(np.diff(b.time_s))) / span_b)
-    if abs(ratio - 1.0) <= RATE_SPREAD + 3.0 * step:
-        return
-    factor = named_factor(ratio)
     told = f"the {names[1]} came or went at another time than the {names[0]}, a clock is off, or the records "
     told += 'are of two runs; allowed: join.method = "given" with run.offset'
-    lasts = f"the {names[0]} lasts {span_a:.4g} s, the {names[1]} in the other record {span_b:.4g} s"
-    told = f"factor {factor}" if factor else told
-    raise Mismatch(f"{lasts}, {ratio:.4f} times as long: {told}", where=where)
+    lasts = f"the {names[0]} lasts {first:.4g} s, the {names[1]} in the other record {second:.4g} s"
+    told = f"factor {factor}" if (factor := named_factor(first / second)) else told
+    raise Mismatch(f"{lasts}, {first / second:.4f} times as long: {told}", where=where)
 
 
 def _by_event(a: Series, b: Series, where: str) -> ClockJoin:

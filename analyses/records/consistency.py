@@ -114,11 +114,6 @@ def _smooth(record: Record, values: Floats) -> Floats:
     return np.asarray(sosfiltfilt(butter(2, share, output="sos"), values, padtype="even"))
 
 
-def _moving(*signals: Floats) -> Mask:
-    """Where one of some signals is not small: in a long rest there is nothing but noise."""
-    return np.any([np.abs(values) > IN_MOTION * np.max(np.abs(values)) for values in signals], axis=0)
-
-
 def _inner(record: Record) -> slice:
     """Without the twentieth part at both ends, where a filter starts and stops."""
     return slice(len(record) // 20, len(record) - len(record) // 20)
@@ -154,7 +149,8 @@ def rate_ratio(design: Design, record: Record) -> RateRatio | None:
         return None
     first, last = (_smooth(record, values) for values in (record[name][:-1], record[name][1:]))
     speed = 0.5 * (first + last)
-    moves = _moving(rate, speed)
+    # in a long rest there is nothing but noise
+    moves = np.any([np.abs(one) > IN_MOTION * np.max(np.abs(one)) for one in (rate, speed)], axis=0)
     found, alike = ratio_of(speed[moves], rate[moves])
     low, high = -inf, inf
     x, y = (_thinned(record, values) for values in (rate, speed))
@@ -197,8 +193,13 @@ def _rate(design: Design, record: Record) -> Finding | None:
         return None
     subject, off = f"{name} against the rate of the {ratio.place}", ratio.found - 1.0
     if abs(ratio.alike) < ALIKE:
-        other = _other(record, name, ratio.rate, ratio.moves)
-        return Finding(subject, False, f"they are not alike (cosine {ratio.alike:.2f}){other}")
+        told = f"they are not alike (cosine {ratio.alike:.2f})"
+        rest = [other for other in record.signals if other not in (name, "angle", "output_angle", "position")]
+        likes = {other: _smooth(record, record[other][1:])[ratio.moves] for other in rest}
+        swapped = (n for n, one in likes.items() if abs(ratio_of(one, ratio.rate[ratio.moves])[1]) > 0.97)
+        if other := next(swapped, ""):
+            told += f"; {other} is: are the columns of {name} and {other} swapped?"
+        return Finding(subject, False, told)
     said = f"the {name} is {ratio.found:.4g} times the rate of the {ratio.place}"
     if not ratio.doubt and abs(off) <= 0.5:
         return Finding(subject, True, f"{said}: one clock, one scale")
@@ -242,8 +243,7 @@ def _ticks_a_row(design: Design, record: Record) -> tuple[float, bool]:
 def _time(design: Design, record: Record) -> Finding | None:
     """A unit of the time that the lag behind the command tells, or what a current accelerates."""
     place = place_of(design, record)
-    told = "" if place is None else wrong_time(design, record, place[1])
-    if told:
+    if place is not None and (told := wrong_time(design, record, place[1])):
         return Finding("time against the lag behind the command", False, told)
     told = wrong_time_of_speed(design, record)
     return Finding("time against the current", False, told) if told else None
@@ -294,11 +294,9 @@ def _jumps(design: Design, record: Record) -> Finding | None:
         return None
     unit = "m" if design.axis == "linear" else "rad"
     jumps, few = named_rows(record, rows, place[0], unit, jumps=True), len(rows) <= FEW_ROWS * len(record)
-    told = (
-        f"the {place[0]} jumps {jumps}: more than the speed limit, {reachable_speed(design):.4g} {unit}/s at "
-    )
-    told += "the motor, allows in that time: "
-    told += BAD_ROW if few else "is the unit of the position or of the time right?"
+    most = f"more than the speed limit, {reachable_speed(design):.4g} {unit}/s at the motor, allows"
+    told = BAD_ROW if few else "is the unit of the position or of the time right?"
+    told = f"the {place[0]} jumps {jumps}: {most} in that time: {told}"
     return Finding(f"steps of the {place[0]} from row to row", False, told)
 
 
@@ -338,16 +336,6 @@ def _steps(design: Design, record: Record) -> Finding | None:
     return Finding(f"steps of the {place[0]} from row to row", not told, words)
 
 
-def _other(record: Record, name: str, rate: Floats, moves: Mask) -> str:
-    """The signal that is more like the rate, if there is one: two columns are swapped."""
-    for other, values in record.signals.items():
-        if other in (name, "angle", "output_angle", "position"):
-            continue
-        if abs(ratio_of(_smooth(record, values[1:])[moves], rate[moves])[1]) > 0.97:
-            return f"; {other} is: are the columns of {name} and {other} swapped?"
-    return ""
-
-
 def _reduction(design: Design, record: Record) -> Finding | None:
     if not {"angle", "output_angle"} <= set(record.signals) or design.axis == "linear":
         return None
@@ -366,10 +354,7 @@ def _reduction(design: Design, record: Record) -> Finding | None:
 
 
 def _twist_share(design: Design, record: Record) -> float:
-    """What play, the largest moment and the load's inertia (rms) twist the coupling by.
-
-    A share of the output's motion (rms).
-    """
+    """What play, largest moment and load's inertia twist the coupling by, over the output's motion, rms."""
     if design.coupling is None:
         return 0.0
     own = record["output_angle"]
@@ -382,7 +367,7 @@ def _twist_share(design: Design, record: Record) -> float:
     return twist / behind / max(float(np.std(own)), 1e-300)
 
 
-def electrical_parts(design: Design, record: Record) -> dict[str, tuple[float, float]]:
+def _electrical_parts(design: Design, record: Record) -> dict[str, tuple[float, float]]:
     """What R i and kE w count in a recorded voltage, each by its least and largest ratio to the design's.
 
     Where the record does not tell one from the other, their sum; empty without voltage, current and motion.
@@ -432,7 +417,7 @@ def _electrical(design: Design, record: Record) -> Finding | None:
 def _voltage_told(design: Design, record: Record) -> tuple[bool | None, str] | None:
     """Whether each part of the voltage counts once, and in words; None where nothing tells."""
     doubt = abs(clock_doubt(design, record))
-    parts = electrical_parts(design, record).items()
+    parts = _electrical_parts(design, record).items()
     told = [_counted(design, name, *ends, doubt if name == "kE w" else 0.0) for name, ends in parts]
     each = [one for one, _ in told]
     passed = False if False in each else None if None in each else True
@@ -470,7 +455,7 @@ def resistance_doubt(design: Design, record: Record) -> float:
     """
     if one_phase(design, record):
         return 0.0
-    low, high = electrical_parts(design, record).get("R i", (1.0, 1.0))
+    low, high = _electrical_parts(design, record).get("R i", (1.0, 1.0))
     agrees = not isfinite(low) or _counted(design, "R i", low, high)[0] is True
     return 0.0 if agrees else 0.5 * (low + high) - 1.0
 
@@ -495,8 +480,9 @@ def _counted(
     kelvin = (ratio - 1.0) / COPPER_1_K
     warm = name == "R i" and WINDING_K[0] < kelvin < WINDING_K[1]
     if warm:
-        text += f": a winding {kelvin:+.0f} K from the design's"
-        text += f", or a current {1.0 / ratio:.3g} times the real"
+        text += (
+            f": a winding {kelvin:+.0f} K from the design's, or a current {1.0 / ratio:.3g} times the real"
+        )
     return (None if warm else False), with_factor(text, 1.0 / ratio if ratio > 0.0 else 0.0)
 
 
@@ -506,15 +492,12 @@ def _command(design: Design, record: Record) -> Finding | None:
     Whether it is followed as the design's loops follow it, the simulation of the record tells.
     """
     for command, answer in FOLLOWED:
-        if not {command, answer} <= record.signals.keys():
+        # a step that begins with the record tells no ratio
+        if not {command, answer} <= record.signals.keys() or not np.ptp(record[command]):
             continue
-        values = record[answer]
-        if (command, answer) in (("reference", "angle"), ("output_speed_reference", "speed")):
-            values = values / design.total_ratio
-        a, b = (part - part.mean() for part in (values, record[command]))
-        if not np.ptp(record[command]):  # a step that begins with the record tells no ratio
-            continue
-        ratio, alike = ratio_of(a, b)
+        output = (command, answer) in (("reference", "angle"), ("output_speed_reference", "speed"))
+        values = record[answer] / (design.total_ratio if output else 1.0)
+        ratio, alike = ratio_of(*(part - part.mean() for part in (values, record[command])))
         subject = f"{answer} against its command"
         if abs(alike) < 0.7:
             return Finding(subject, None, f"cosine {alike:.2f}: not followed")

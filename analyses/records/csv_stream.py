@@ -199,12 +199,14 @@ def _line_blocks(stream: BinaryIO, origin: str, digest: hashlib._Hash) -> Iterat
     data = data.removeprefix(b"\xef\xbb\xbf")
     while data:
         if b"\0" in data:
-            told = "holds NUL bytes: not a text file (UTF-16 is not read; save it as UTF-8)"
-            raise InputError(told, where=origin)
+            raise InputError(
+                "holds NUL bytes: not a text file (UTF-16 is not read; save it as UTF-8)", origin
+            )
         cut = data.rfind(b"\n") + 1
         if not cut and len(rest) + len(data) > CSV_LINE_BYTES.most + BLOCK_BYTES:
-            told = f"a line longer than {CSV_LINE_BYTES.most} bytes: not a table of numbers"
-            raise InputError(told, where=origin)
+            raise InputError(
+                f"a line longer than {CSV_LINE_BYTES.most} bytes: not a table of numbers", origin
+            )
         if cut:
             yield rest + data[:cut]
         rest = data[cut:] if cut else rest + data
@@ -248,15 +250,15 @@ def _number(cell: str, name: str, decimal: str) -> float:
     text = cell.strip().strip('"').strip()
     if text in MISSING_TEXTS:
         return math.nan
+    wrong = f'column "{name}" = "{text[:40]}": not '
     try:
         if "_" in text or (decimal == "," and "." in text):
             raise ValueError(text)
         value = float(text.replace(",", ".") if decimal == "," else text)
     except ValueError:
-        told = f'column "{name}" = "{text[:40]}": not a number (decimal mark "{decimal}")'
-        raise ValueError(told) from None
+        raise ValueError(f'{wrong}a number (decimal mark "{decimal}")') from None
     if not math.isfinite(value):
-        raise ValueError(f'column "{name}" = "{text[:40]}": not finite')
+        raise ValueError(f"{wrong}finite")
     return value
 
 
@@ -286,14 +288,11 @@ class BoundedRows:
             self._held.append(_averaged(part[:whole], self.factor))
             self._rest = part[whole:]
             while sum(map(len, self._held)) > self.limit:
-                self._halve()
-
-    def _halve(self) -> None:
-        held = np.concatenate(self._held)
-        even = len(held) // 2 * 2
-        self._rest = np.concatenate([np.repeat(held[even:], self.factor, axis=0), self._rest])
-        self._held = [_averaged(held[:even], 2)]
-        self.factor *= 2
+                held = np.concatenate(self._held)
+                even = len(held) // 2 * 2
+                self._rest = np.concatenate([np.repeat(held[even:], self.factor, axis=0), self._rest])
+                self._held = [_averaged(held[:even], 2)]
+                self.factor *= 2
 
     def array(self) -> Floats:
         last = [self._rest.mean(axis=0, keepdims=True)] if len(self._rest) else []

@@ -85,14 +85,13 @@ def spec_of_names(
         if isinstance(found, str):
             why[column] = found
             continue
-        before = signals.get(found.name)
-        taken = found
-        if before is not None:  # behind a coupling the output's column is not the motor's
+        before = signals.setdefault(found.name, found)
+        if before is not found:  # behind a coupling the output's column is not the motor's
             new, old = (taken_apart(str(one.column)).base for one in (found, before))
-            taken = found if new.startswith("output_") and old.startswith("motor_") else before
-            other = before if taken is found else found
+            behind = new.startswith("output_") and old.startswith("motor_")
+            taken, other = (found, before) if behind else (before, found)
             why[str(other.column)] = f"{MEANINGS[found.name]} is read from {taken.column}"
-        signals[found.name] = taken
+            signals[found.name] = taken
     first, *others = times or [""]
     why |= dict.fromkeys(others, f"the time is read from {first}")
     if not first or not signals:

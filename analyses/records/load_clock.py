@@ -57,14 +57,8 @@ def by_current(drive: Record, sensor: Record, join: ClockJoin, signal: str) -> C
         offset = join.offset_s + (join.rate - 1.0) * float(np.mean(sensor.time_s))
         return by_current(drive, sensor, replace(join, offset_s=offset, rate=1.0, rate_std=None), signal)
     width = 0.5 * period * np.count_nonzero(ratio <= 1.0)
-    return replace(
-        join,
-        offset_s=float(offsets[np.argmin(ratio)]),
-        offset_std_s=float(width),
-        quality=quality,
-        method="correlation",
-        first_signal="current",
-    )
+    offset, by = float(offsets[np.argmin(ratio)]), replace(join, method="correlation", first_signal="current")
+    return replace(by, offset_s=offset, offset_std_s=float(width), quality=quality)
 
 
 def _against_the_best(current: Floats, load: Floats) -> tuple[Floats, float]:
@@ -76,11 +70,7 @@ def _against_the_best(current: Floats, load: Floats) -> tuple[Floats, float]:
     """
     n, load, total = len(current), load - load.mean(), float(current @ current)
     waves = np.linalg.qr(legvander(np.linspace(-1.0, 1.0, n), min(ORDERS, n) - 1))[0].T
-    drift, squares, own = (
-        slow_shares(len(waves)),
-        np.concatenate([[0.0], np.cumsum(load**2)]),
-        waves @ current,
-    )
+    drift, squares, own = slow_shares(len(waves)), np.append(0.0, np.cumsum(load**2)), waves @ current
     placed = np.array([correlate(load, one, mode="valid", method="fft") for one in [*waves, current]])
     power = squares[n:] - squares[:-n] - drift @ placed[:-1] ** 2
     beside = np.maximum(placed[-1] - (drift * own) @ placed[:-1], 0.0)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from datetime import datetime
 from itertools import chain, count
@@ -131,6 +131,10 @@ class Record:
             **cut_rows,
             first_row=self.first_row + start,
         )
+
+    def without(self, names: Collection[str]) -> Record:
+        """The record without some signals."""
+        return replace(self, signals={n: each for n, each in self.signals.items() if n not in names})
 
     def resampled(self) -> Record:
         """The record on a regular grid by linear interpolation, with the fact and its error noted.

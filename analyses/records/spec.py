@@ -41,22 +41,22 @@ class CsvFormat:
     stamps: bool = False  # the time is written as ISO 8601 stamps, read as seconds from the first
 
     def __post_init__(self) -> None:
-        if self.separator != "whitespace" and (len(self.separator) != 1 or self.separator in "\r\n\"'"):
-            raise InputError(f'separator = "{self.separator}": one character, or "whitespace"')
-        if self.decimal not in (".", ","):
-            raise InputError(f'decimal = "{self.decimal}": "." or ","')
-        if self.separator == self.decimal:
-            raise InputError(f'separator and decimal are both "{self.decimal}": they must differ')
+        mark, encoding = self.separator, self.encoding
         try:
-            ascii_like = "a,1\n".encode(self.encoding) == b"a,1\n"
+            ascii_like = "a,1\n".encode(encoding) == b"a,1\n"
         except LookupError:
             ascii_like = False
-        if not ascii_like:
-            raise InputError(f'encoding = "{self.encoding}": must be one that extends ASCII, such as utf-8')
-        if self.skip_lines < 0:
-            raise InputError(f"skip_lines = {self.skip_lines}: 0 or more")
-        if self.header is False and not self.names:
-            raise InputError("header = false: then names are needed")
+        odd = mark != "whitespace" and (len(mark) != 1 or mark in "\r\n\"'")
+        for wrong, told in (
+            (odd, f'separator = "{mark}": one character, or "whitespace"'),
+            (self.decimal not in (".", ","), f'decimal = "{self.decimal}": "." or ","'),
+            (mark == self.decimal, f'separator and decimal are both "{mark}": they must differ'),
+            (not ascii_like, f'encoding = "{encoding}": must be one that extends ASCII, such as utf-8'),
+            (self.skip_lines < 0, f"skip_lines = {self.skip_lines}: 0 or more"),
+            (self.header is False and not self.names, "header = false: then names are needed"),
+        ):
+            if wrong:
+                raise InputError(told)
 
     @property
     def has_header(self) -> bool:

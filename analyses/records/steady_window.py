@@ -32,7 +32,7 @@ class SteadyCriterion:
 CRITERION = SteadyCriterion()
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class SteadyWindow:
     """The part of a record that counts as steady: rows ``start:stop``, and the limit that was applied."""
 
@@ -66,14 +66,8 @@ def find_steady_window(
         calmest = float(np.min(np.abs(slope[moving]), initial=np.inf))
         told = f"the smallest acceleration is {calmest:.3g} rad/s2, the limit {limit:.3g} rad/s2"
         raise InputError(f"no steady part of {criterion.least_duration_s:g} s: {told}")
-    return SteadyWindow(
-        start=start,
-        stop=stop,
-        start_s=float(time_s[start]),
-        stop_s=float(time_s[stop - 1]),
-        limit_rad_s2=float(limit),
-        largest_acceleration_rad_s2=float(np.max(np.abs(slope[start - half : stop - half]))),
-    )
+    largest = float(np.max(np.abs(slope[start - half : stop - half])))
+    return SteadyWindow(start, stop, float(time_s[start]), float(time_s[stop - 1]), float(limit), largest)
 
 
 def moving_slope(time_s: Floats, values: Floats, samples: int) -> Floats:

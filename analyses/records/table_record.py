@@ -62,7 +62,7 @@ class SiRows:
         self._spec, self._counts, self._origin = spec, counts, origin
         self._factor = spec.time.tick_s or unit_factor(spec.time.unit, "s", "time")
         self._factors = [to_si(signal)[0] for signal in spec.signals]
-        self._row, self._wraps, self._last_time = 0, 0.0, -np.inf
+        self._wraps, self._last_time = 0.0, -np.inf
         self._last_raw: float | None = None
 
     def __call__(self, block: Block) -> Floats:
@@ -70,8 +70,7 @@ class SiRows:
         spec, times = self._spec, self._spec.time
         block = self._without_missing(block)
         if times.period_s is not None:
-            time, raw = (self._row + np.arange(len(block.values))) * times.period_s, block.values
-            self._row += len(time)
+            time, raw = (self._counts.rows_out + np.arange(len(block.values))) * times.period_s, block.values
         else:
             if times.minimum is not None:
                 late = block.values[:, 0] >= times.minimum
@@ -119,23 +118,18 @@ class SiRows:
         keep = np.asarray(time > reached[:-1])
         if not keep.all() and self._spec.disorder == "error":
             k = int(keep.argmin())
-            message = f"time {time[k]:.15g} s does not come after {reached[k]:.15g} s"
+            told = f"time {time[k]:.15g} s does not come after {reached[k]:.15g} s"
             if time[k] == reached[k]:
-                message += ": a row twice, or stamps of too few digits (then give time.period, not a column)"
-            message += "; allowed: rising times: a "
-            message += 'file for each run; or disorder = "drop" in a record file, which leaves out this row '
-            message += "and all that follow up to the time that was reached"
-            raise InputError(message, where=f"{self._origin}:{block.lines[k]}")
+                told += ": a row twice, or stamps of too few digits (then give time.period, not a column)"
+            told += (
+                '; allowed: rising times: a file for each run; or disorder = "drop" in a record file, which '
+            )
+            told += "leaves out this row and all that follow up to the time that was reached"
+            raise InputError(told, where=f"{self._origin}:{block.lines[k]}")
         return keep
 
 
-def record_of_columns(
-    vectors: Mapping[str, Floats],
-    spec: RecordSpec,
-    path: Path,
-    digest: str,
-    constants: Mapping[str, float] | None = None,
-) -> Record:
+def record_of_columns(vectors: Mapping[str, Floats], spec: RecordSpec, path: Path, digest: str) -> Record:
     """Read the columns that a spec names; NaN and disorder in time are treated as in a CSV file."""
     header = tuple(vectors)
     names = [header[k] for k in spec.positions(header, str(path))]
@@ -154,17 +148,11 @@ def record_of_columns(
     counts = RowCounts(rows_in=len(table), columns=header)
     block = Block(values=table, lines=np.arange(1, len(table) + 1))
     rows = SiRows(spec, counts, f"{path}, row")(block)
-    return record_of_rows(rows, spec, path, counts, digest, constants=constants)
+    return record_of_rows(rows, spec, path, counts, digest)
 
 
 def record_of_rows(
-    rows: Floats,
-    spec: RecordSpec,
-    path: Path,
-    counts: RowCounts,
-    digest: str,
-    averaged: int = 1,
-    constants: Mapping[str, float] | None = None,
+    rows: Floats, spec: RecordSpec, path: Path, counts: RowCounts, digest: str, averaged: int = 1
 ) -> Record:
     """A record of rows of time and signals in SI, its holes filled."""
     if len(rows) < 2:
@@ -187,7 +175,6 @@ def record_of_rows(
         counts=counts,
         averaged=averaged,
         sha256=digest,
-        constants=MappingProxyType(dict(constants or {})),
         notes=tuple(notes),
         inputs=inputs_of(spec, counts.columns),
         resample_tolerance=spec.resample_tolerance,

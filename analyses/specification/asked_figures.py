@@ -21,11 +21,7 @@ from analyses.motion.settling import ending_of
 
 
 def said_of(design: Design, frequency_hz: float | None) -> str:
-    """What rate and acceleration of the command make of a bandwidth, in words.
-
-    Where one of them limits a sine of full deflection at that frequency, it is simulated, a whole number of
-    ticks a period. Empty where the command has neither, the drive no position loop, or there is no bandwidth.
-    """
+    """What rate and acceleration of the command make of a bandwidth, in words; simulated if they act."""
     if frequency_hz is None or not 0.0 < frequency_hz < inf:
         return ""
     full = design.validation.full_deflection_rad
@@ -53,10 +49,7 @@ _ANSWERS = {"failures": failures, "duty": duty, "cycles": limit_cycles, "corners
 
 
 def answer_of(design: Design, analysis: str) -> Any:
-    """What ``failures``, ``duty``, ``cycles`` or ``corners`` finds, asked by default.
-
-    Computed once for all who ask of a design in turn: its requirements, corners, the sections of a report.
-    """
+    """What ``failures``, ``duty``, ``cycles`` or ``corners`` finds by default, once for all who ask."""
     if analysis == "corners":
         return _answered(design, analysis)
     own = tuple(one for one in design.requirements if one.quantity in ANALYSIS_QUANTITIES)
@@ -71,10 +64,7 @@ def _answered(design: Design, analysis: str) -> Any:
 
 @dataclass(frozen=True)
 class AskedFigures:
-    """The figures of one design that an analysis finds; each is run only where one of its figures is read.
-
-    Attributes are the readers of `actuator_lti.asked.quantities`; ``None``: the drive has no such figure.
-    """
+    """What readers of `ANALYSIS_QUANTITIES` ask of one design: each analysis is run where one is read."""
 
     design: Design
 

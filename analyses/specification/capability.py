@@ -55,10 +55,7 @@ def thermal_duty(design: Design, rms_current_A: float | None) -> float | None:
 def manoeuvres(
     design: Design, load_Nm: float, rate_rad_s: float, acceleration_rad_s2: float, settling_s: float
 ) -> Iterator[Manoeuvre]:
-    """Simulate a step, a sine below the top rate, and a sawtooth at it, all at full deflection.
-
-    Rate and acceleration: the largest of the output; ``settling_s``: of the linear loop.
-    """
+    """A step, a sine below the top rate and a sawtooth, full deflection; rates of the output."""
     full = design.validation.full_deflection_rad
     moves, turns = 0.0 < rate_rad_s < math.inf, 0.0 < acceleration_rad_s2 < math.inf
     travel = full / rate_rad_s if moves else 0.0
@@ -87,7 +84,10 @@ def _manoeuvre(
     torque = motor_torque_Nm(design, run.current_A, run.voltage_V)[-count:]
     current = np.abs(run.current_A[-count:]) if design.motor.has_electrical_dynamics else None
     speed = run.motor_speed_rad_s[-count:]
-    thin = _thinned(speed, torque)
+    # points that lie evenly along the path in the plane, so that fast parts keep their shape
+    spans = [max(float(np.ptp(each)), 1e-300) for each in (speed, torque)]
+    way = np.append(0.0, np.cumsum(np.hypot(np.diff(speed) / spans[0], np.diff(torque) / spans[1])))
+    thin = np.unique(np.minimum(np.searchsorted(way, np.linspace(0.0, way[-1], POINTS)), len(way) - 1))
     rms = None if current is None else _rms(current)
     return Manoeuvre(
         name=name, load_Nm=load_Nm, speed_rad_s=speed[thin], torque_Nm=torque[thin], rms_current_A=rms,
@@ -101,13 +101,6 @@ def _manoeuvre(
 
 def _rms(values: np.ndarray) -> float:
     return float(np.sqrt(np.mean(values**2)))
-
-
-def _thinned(speed: np.ndarray, torque: np.ndarray) -> np.ndarray:
-    """Choose points that lie evenly along the path in the plane, so that fast parts keep their shape."""
-    spans = (max(float(np.ptp(speed)), 1e-300), max(float(np.ptp(torque)), 1e-300))
-    way = np.append(0.0, np.cumsum(np.hypot(np.diff(speed) / spans[0], np.diff(torque) / spans[1])))
-    return np.unique(np.minimum(np.searchsorted(way, np.linspace(0.0, way[-1], POINTS)), len(way) - 1))
 
 
 @dataclass(frozen=True)
@@ -128,10 +121,7 @@ class TorqueSpeedPlane:
 
 
 def torque_speed_plane(design: Design, top_speed_rad_s: float) -> TorqueSpeedPlane:
-    """Draw up the plane up to a little above the top speed.
-
-    Sources: equation (1) in steady motion, ``u = R i + kE w``; equation (9).
-    """
+    """The plane to a little above the top speed: ``u = R i + kE w`` (equation 1), and equation (9)."""
     motor, limits = design.effective_motor, design.limits
     top = top_speed_rad_s if 0.0 < top_speed_rad_s < math.inf else 1.0
     speed = np.linspace(0.0, 1.25 * top, PLANE_POINTS)
@@ -189,9 +179,7 @@ class Capability:
     """What the drive can do at one load torque; output side unless a name says motor."""
 
     figures: DriveFigures  # in closed form
-    # Steady rate when the command runs away from the output; ``None`` where the rate has no bound, or was not
-    # reached in the time that a run may take
-    simulated_rate_rad_s: float | None
+    simulated_rate_rad_s: float | None  # steady, running away; ``None``: no bound, or not reached in time
     simulated_acceleration_rad_s2: float | None  # largest mean over a stretch of the start
     simulated_current_A: float | None  # mean motor current at the steady rate
     current_ratio: float | None  # that current over the continuous current
@@ -199,11 +187,8 @@ class Capability:
 
 
 def capability(design: Design, load_Nm: float, settling_s: float) -> Capability:
-    """Run the command away from the output and read what the drive makes of it.
-
-    Behind the profile of the command, and without what depends on the angle: at one load, as the figures are.
-    """
-    design = replace(design, command=Command(), load=design.load.level(), motor=design.motor.level())
+    """Run away from the output, behind the profile, at one load: without what depends on the angle."""
+    design = replace(design, command=Command(), load=design.load.level(), motor=design.motor.straight())
     figures = drive_figures(design, load_Nm)
     rate, push = figures.output_rate_rad_s, figures.acceleration_rad_s2
     current, continuous = figures.motor_current_A, design.limits.continuous_current_A
@@ -224,11 +209,11 @@ def capability(design: Design, load_Nm: float, settling_s: float) -> Capability:
     tail = max(4, int(STEADY_SHARE * speed.size))
     steady = float(speed[-tail:].mean())
     settled = abs(float(speed[-1] - speed[-tail])) < 2e-3 * abs(steady)
-    found = replace(found, simulated_acceleration_rad_s2=_acceleration(design, load, direction, rate, push))
-    if not settled:
-        return found
+    acceleration = _acceleration(design, load, direction, rate, push)
     drawn = abs(float(run.current_A[-tail:].mean())) if design.motor.has_electrical_dynamics else None
-    return replace(found, simulated_rate_rad_s=steady, simulated_current_A=drawn)
+    if settled:
+        found = replace(found, simulated_rate_rad_s=steady, simulated_current_A=drawn)
+    return replace(found, simulated_acceleration_rad_s2=acceleration)
 
 
 def _acceleration(design: Design, load_Nm: float, direction: int, rate: float, push: float) -> float:

@@ -49,8 +49,9 @@ def evaluate_requirements(
     for done, requirement in enumerate(design.requirements):
         if progress is not None:
             progress(done, len(design.requirements))
-        found = judged(design, requirement, figures, AskedFigures(design).figure)
-        made += [_with_limits(design, verdict, moving) for verdict in found]
+        for one in judged(design, requirement, figures, AskedFigures(design).figure):
+            said = () if one.value is None else (_in_motion(one, moving), _limited(design, one))
+            made.append(replace(one, reason="; ".join(filter(None, (one.reason, *said)))))
     return tuple(made)
 
 
@@ -61,10 +62,7 @@ def judged_nominally(
     untold: str,
     progress: Progress = None,
 ) -> tuple[RequirementVerdict, ...]:
-    """Judge in the nominal design what is not asked of its variants: not met, or else not proven of all.
-
-    ``untold``: why it is not asked of them. The rest is as in `evaluate_requirements`.
-    """
+    """Judge in the nominal design what is not asked of its variants: not met, or by ``untold`` not proven."""
     if not left:
         return ()
 
@@ -77,12 +75,6 @@ def judged_nominally(
 
     nominal = replace(design, requirements=tuple(left))
     return tuple(map(of_all, evaluate_requirements(nominal, figures, progress)))
-
-
-def _with_limits(design: Design, verdict: RequirementVerdict, moving: Moving) -> RequirementVerdict:
-    """Beside a figure what it is in motion, and what the profile of the command makes of it."""
-    said = () if verdict.value is None else (_in_motion(verdict, moving), _limited(design, verdict))
-    return replace(verdict, reason="; ".join(filter(None, (verdict.reason, *said))))
 
 
 def _limited(design: Design, verdict: RequirementVerdict) -> str:

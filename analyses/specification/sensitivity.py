@@ -1,8 +1,4 @@
-"""How much each parameter moves each figure: exact loops, stated finite differences.
-
-The slope is a central difference over the exact sampled loops with a step of 0.1 % of the parameter; the
-swing is the figure computed anew with the parameter at both ends of its tolerance, or 10 % off without one.
-"""
+"""How much each parameter moves each figure: slopes over 0.1 %, swings over its tolerance or 10 %."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -95,11 +91,7 @@ def moved(design: Design, base: Mapping[str, float], moves: Sequence[Mapping[str
 def population_figures(
     population: Population, design: Design, *, time_figures: bool = False
 ) -> dict[str, np.ndarray]:
-    """Figures of many designs by column, as `Sensitivity` names them; static ones at the design's loads.
-
-    Margins of an unstable loop are negative: how far it is from stable. Behind the mean of a limited jerk the
-    response to the command is not among them.
-    """
+    """Figures of many designs by column; static ones at the design's loads, of unstable loops negative."""
     columns = population_loop_figures(population, design, time_figures=time_figures)
     for name, load in drive_cases(design.validation.loads_Nm):
         if name != "motor_current" or design.motor.has_electrical_dynamics:

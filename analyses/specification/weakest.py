@@ -1,8 +1,7 @@
 """The weakest point of a drive: its least margin over all views, against what is required or customary.
 
-Views are the loops with the outer ones open, the loop cut at each break point with all others closed, the
-operating points, and the corners of temperature, supply and tolerances. Margins of different kinds are ranked
-by how near they let L come to -1 (`actuator_lti.asked.quantities.reserve`), not by shares of decibels.
+Margins of different kinds are ranked by how near they let L come to -1
+(`actuator_lti.asked.quantities.reserve`), not by shares of decibels.
 """
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -16,7 +15,7 @@ from actuator_lti.drive.operating import OperatingPoint
 from actuator_lti.margins import StabilityMargins
 from analyses.corners.run import Corners
 from analyses.linear.loop_figures import LoopFigures
-from analyses.linear.loop_survey import BreakPoint, LoopSurvey, OperatingPointFigures
+from analyses.linear.loop_survey import LoopSurvey, OperatingPointFigures
 
 
 @dataclass(frozen=True)
@@ -64,7 +63,11 @@ def views(survey: LoopSurvey, corners: Corners | None = None) -> Iterator[View]:
     """Every view of a drive, the loops as they are judged first."""
     yield from _loops("", survey.figures)
     for name, point in survey.break_points.items():
-        yield _at_break_point(name, point)
+        figures = {} if point.figures is None else dict(figures_of(point.figures.margins))
+        if point.exact is not None and point.exact.stable:  # periodic: the fundamental alone is not all of it
+            up, down = point.exact.gain_upper, point.exact.gain_lower
+            figures["gain_margin"] = 20.0 * log10(min(up, 1.0 / down if down else inf))
+        yield View("all loops closed", "", "", point.stable, figures, name, found=point.figures)
     for one in survey.operating_points:
         if one.kind != "describing-function":
             at = {"kind": one.kind, "load_Nm": one.load_Nm or 0.0, "design": one.design}
@@ -81,14 +84,6 @@ def _loops(place: str, loops: Mapping[str, LoopFigures], **at: Any) -> Iterator[
         for rotor, found in seen:
             margins = found.margins
             yield View(place, name, rotor, margins.stable, figures_of(margins), found=found, **at)
-
-
-def _at_break_point(name: str, point: BreakPoint) -> View:
-    figures = {} if point.figures is None else dict(figures_of(point.figures.margins))
-    if point.exact is not None and point.exact.stable:  # periodic: the fundamental alone is not all of it
-        up, down = point.exact.gain_upper, point.exact.gain_lower
-        figures["gain_margin"] = 20.0 * log10(min(up, 1.0 / down if down else inf))
-    return View("all loops closed", "", "", point.stable, figures, name, found=point.figures)
 
 
 def figures_of(margins: StabilityMargins) -> dict[str, float]:
@@ -114,10 +109,7 @@ def _points(view: View, design: Design) -> Iterator[WeakPoint]:
 
 
 def limit_of(design: Design, quantity: str, view: View) -> tuple[float, bool]:
-    """The limit of a margin in a view, and whether a requirement sets it.
-
-    A requirement holds for a loop as it is judged; elsewhere custom does.
-    """
+    """The limit of a margin in a view; whether a requirement sets it, as it does of loops as judged."""
     limits = [
         item.minimum
         for item in design.requirements
@@ -129,10 +121,7 @@ def limit_of(design: Design, quantity: str, view: View) -> tuple[float, bool]:
 
 @dataclass(frozen=True)
 class Spread:
-    """A margin of a loop over the operating points of a drive: least and most in size, and where it is least.
-
-    With its sign, as margins are written: a gain margin downwards is negative.
-    """
+    """A margin of a loop over the operating points, with its sign, and where it is least in size."""
 
     least: float
     most: float

@@ -1,7 +1,4 @@
-"""The stiffness of a design, dynamic and static: the inverse of the response from M_ext to the output.
-
-It is put to the simulator: by its own derivative, and by a moment injected at the output.
-"""
+"""The stiffness of a design, the inverse of the response from M_ext to the output, and the simulator's."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -32,14 +29,10 @@ State = Literal["powered", "shorted", "open"]
 class StiffnessCurve:
     """Dynamic stiffness K = M_ext / output angle over frequency, in one state of the drive."""
 
-    # All loops closed and the command held; unpowered with the winding shorted (a bridge at zero voltage);
-    # unpowered without a current
-    state: State
+    state: State  # loops closed, command held; unpowered, winding shorted; without a current
     frequency_hz: npt.NDArray[np.float64]
-    # N m/rad (linear axis: N/m); inf where the output does not move
-    stiffness_Nm_rad: npt.NDArray[np.complex128]
-    # Limit at zero frequency: below 0 of a drive that pushes away, 0 of a free one, inf of one that returns
-    static_Nm_rad: float
+    stiffness_Nm_rad: npt.NDArray[np.complex128]  # (linear axis: N/m); inf: it does not move
+    static_Nm_rad: float  # at zero frequency: below 0 it pushes away, 0 of a free one, inf if it returns
     load_Nm: float = 0.0  # at the output: which piece of a spring that bends is used
     way: OperatingPoint = "sliding"  # of friction by the coupling's torque (`actuator_lti.loops.stiffness`)
 
@@ -58,17 +51,13 @@ class LostMotion:
     """How far the output is apart under a small moment to either side, the motor held; at least the play."""
 
     play_rad: float  # the play of the coupling at the output
-    # Read at +-3 % of the largest load moment (`actuator_lti.loops.stiffness.lost_motion_rad`)
-    foreseen_rad: float
+    foreseen_rad: float  # at +-3 % of the largest load moment (`actuator_lti.loops.stiffness`)
     seen_rad: float | None = None  # the same in the simulator; None where it was not asked
 
 
 @dataclass(frozen=True)
 class Check:
-    """One frequency, by the simulator's own derivative, without play.
-
-    Both are inf where the output does not move, as behind a gear that locks.
-    """
+    """One frequency by the simulator's own derivative, without play; both inf where nothing moves."""
 
     frequency_hz: float
     foreseen_Nm_rad: complex
@@ -191,21 +180,11 @@ def stiffness_at_rest(design: Design, asked: Sequence[tuple[float, float]]) -> t
     return tuple(made)
 
 
-def lost_motion(design: Design, *, seen: bool = False) -> LostMotion | None:
-    """Lost motion of a coupling (`actuator_lti.loops.stiffness`); None for a rigid drive train."""
-    if design.coupling is None:
-        return None
-    play = design.coupling.play_rad / design.ratio_behind_coupling
-    read = lost_motion_seen(design) if seen and design.load.moment_max_Nm > 0.0 else None
-    return LostMotion(play, linear.lost_motion_rad(design), read)
-
-
 def lost_motion_seen(design: Design) -> float:
     """Lost motion in the simulator, the rotor held: a slow moment goes to +`LOST_MOTION_SHARE`, then to -.
 
-    Slow is `PERIODS_WITHIN` oscillations of the load on the spring. The load is damped critically against the
-    spring, which no rest shows, in place of its own friction, so that it lands behind the play without a
-    bounce; at both readings the moment stays until it has gone through the play.
+    The load is damped critically against the spring in place of its own friction, so that it lands behind the
+    play without a bounce; at both readings the moment stays until it has gone through the play.
 
     Raises `InputError`: without a coupling, a position loop or a largest load moment.
     """
@@ -254,7 +233,11 @@ def stiffness(design: AnyDesign, *, simulated: bool = True) -> Stiffness:
     asked = [(f, share * largest) for f in REST_HZ for share in REST_FRACTIONS]
     seen = stiffness_at_rest(design, asked) if largest > 0.0 else ()
     unproven = "no position loop holds the output" if simulated and not checks else ""
-    lost = lost_motion(design, seen=simulated and held)
+    lost = None
+    if design.coupling is not None:
+        play = design.coupling.play_rad / design.ratio_behind_coupling
+        read = lost_motion_seen(design) if simulated and held and design.load.moment_max_Nm > 0.0 else None
+        lost = LostMotion(play, linear.lost_motion_rad(design), read)
     return Stiffness(design, stiffness_curves(design), lost, checks, seen, unproven)
 
 

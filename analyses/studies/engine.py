@@ -1,8 +1,6 @@
 """Work that falls into parts, computed here, on a local Dask cluster, or on one that is already there.
 
-Parts are chunks of a numbered study, or any items. What comes of a part must not depend on where it is
-computed; results come in any order and are given to a sink one by one, so that memory holds only a few,
-whatever their number.
+What comes of a part must not depend on where it is computed; results go to a sink one by one, in any order.
 
 Whoever can talk to a Dask scheduler can run code on it. The local cluster therefore listens on this machine
 only, under TLS with certificates that are made for the run and never leave it, and shows no dashboard.
@@ -121,18 +119,6 @@ def quiet() -> AbstractContextManager[None]:
     return silence_logging_cmgr(logging.CRITICAL + 1)
 
 
-@contextmanager
-def _closed_is_lost() -> Iterator[None]:
-    """A client that its scheduler has left is asked for more: `CancelledError`, as for what it was asked."""
-    from distributed.client import ClosedClientError
-
-    try:
-        yield
-    except ClosedClientError as error:
-        raise CancelledError from error
-
-
-@_closed_is_lost()
 def submit(client: Any, work: Work, todo: list[Any], sink: Sink) -> None:
     """Compute on a Dask cluster, with a few parts a worker under way; a lost worker's parts run again."""
     import distributed
@@ -177,10 +163,7 @@ def _the_same(work: Any) -> Any:
 
 
 def _answered(work: Work, proof: Proof, part: Any) -> tuple[Any, Exception | None]:
-    """The result or the error of a part: tried again is only what a dying worker took along.
-
-    A worker proves itself before its first part, also one that has joined late.
-    """
+    """The result or the error of a part; a worker proves itself before its first, whenever it joined."""
     try:
         prove_once(proof, packages_of(work), work)
         return work(part), None
@@ -256,15 +239,18 @@ class Engine:
         if not self.distributed:
             _threads(work, todo, take, self.threads or os.cpu_count() or 1)
             return
+        need("distributed", "cluster", "a cluster of workers")
+        from distributed.client import ClosedClientError  # what a client says that its scheduler has left
+
         finished = False
         try:
             with self._client() as client:
                 submit(client, work, todo, take)
                 finished = True
-        except (OSError, CancelledError) as error:
+        except (OSError, CancelledError, ClosedClientError) as error:
             if not finished:  # a cluster too slow to close takes no result back
                 said = " ".join(str(error).split()) or "no answer in time"
-                if isinstance(error, CancelledError):
+                if not isinstance(error, OSError):
                     said = "the connection is lost"
                 raise NumericalError(
                     f"Dask scheduler {self.scheduler or 'here'}: {said}; what is done is kept: the same"
@@ -273,7 +259,6 @@ class Engine:
 
     @contextmanager
     def _client(self) -> Iterator[Client]:
-        need("distributed", "cluster", "a cluster of workers")
         import distributed
 
         with ExitStack() as stack:

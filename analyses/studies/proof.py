@@ -25,19 +25,19 @@ _proven: set[str] = set()  # proofs of clients that this worker has met
 
 
 def prove(packages: Sequence[str] = CODE, study: Any = None) -> Proof:
-    """What this process computes with, by name: code of packages, libraries, arithmetic, hashes of samples.
-
-    Where the study has a method ``sample``, the bytes that this returns count, too.
-    """
+    """What this process computes with, by name: code, libraries, arithmetic, samples, also of a study."""
     import scipy
 
+    # results of which another kernel, or another number of threads, gives other last digits
+    a = (np.arange(4096.0) ** 2 % 101.0).reshape(64, 64) / 7.0 + 100.0 * np.eye(64)
+    made = (a @ a, np.linalg.solve(a, a.T), np.linalg.eigvals(a), np.exp(a / 101.0), np.sin(a))
     proof = {
         "code": code_version(packages),
         "Python": platform.python_version(),
         "numpy": np.__version__,
         "scipy": scipy.__version__,
         **{name: os.environ.get(name, _UNSET) for name in ARITHMETIC},
-        "a sample of linear algebra": _hash(_linear_algebra()),
+        "a sample of linear algebra": _hash(one.tobytes() for one in made),
     }
     sample = getattr(study, "sample", None)
     return proof if sample is None else {**proof, "sample 0 of the study": _hash([sample()])}
@@ -93,13 +93,6 @@ def hash_of(place: Path, endings: Sequence[str] = (".py",)) -> str:
     parts = ((path.relative_to(place.parent).as_posix(), path) for path in files if path.is_file())
     each = (f"{name}\0".encode() + hashlib.sha256(path.read_bytes()).digest() for name, path in parts)
     return hashlib.sha256(b"".join(each)).hexdigest()
-
-
-def _linear_algebra() -> list[bytes]:
-    """Results of which another kernel, or another number of threads, gives other last digits."""
-    a = (np.arange(4096.0) ** 2 % 101.0).reshape(64, 64) / 7.0 + 100.0 * np.eye(64)
-    made = (a @ a, np.linalg.solve(a, a.T), np.linalg.eigvals(a), np.exp(a / 101.0), np.sin(a))
-    return [one.tobytes() for one in made]
 
 
 def _hash(parts: Iterable[bytes]) -> str:

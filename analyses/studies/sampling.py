@@ -1,9 +1,4 @@
-"""Samples of toleranced parameters: scrambled Sobol points, numbered, each one reproducible alone.
-
-Point number k of a seed is the same whoever draws it and in whatever chunk. A scrambled Sobol sequence
-(Owen 1998; Matousek's linear scramble with a digital shift, as in `scipy.stats.qmc`) fills the tolerance box
-more evenly than independent random numbers, each point on its own being uniform.
-"""
+"""Samples of toleranced parameters: scrambled Sobol points (Owen 1998), each one reproducible alone."""
 
 from __future__ import annotations
 
@@ -158,11 +153,7 @@ class Sampler:
 
 
 def semidefinite_root(matrix: np.ndarray) -> np.ndarray:
-    """Lower triangular L with ``L L' = matrix``, which may be singular; an indefinite one is refused.
-
-    Two parameters that are one (correlation 1 or -1) have a zero on the diagonal of L, so that the second
-    follows the first exactly.
-    """
+    """Lower triangular L with ``L L' = matrix``, also where two are one; an indefinite one is refused."""
     size = len(matrix)
     root = np.zeros((size, size))
     for j in range(size):

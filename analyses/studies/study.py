@@ -40,7 +40,7 @@ A study file is TOML and only data::
 """
 
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from itertools import product
 from math import prod
@@ -158,8 +158,8 @@ def _study_of_text(text: str, path: str | Path, *, keep_going: bool) -> Study:
     tree = parse_toml(text, where)
     root = Table(tree, "", where)
     root.only(("study", "variant", "sweep", "grid", "requirement", "monte_carlo", "nightly"))
-    extra = [dict(table.data) for table in root.tables("requirement")]
-    return _study(root, _Asked(extra, where, lines_of(text, tree)), Path(path).parent, keep_going=keep_going)
+    asked = [dict(table.data) for table in root.tables("requirement")]
+    return _Maker(root, asked, lines_of(text, tree), Path(path).parent, keep_going).study()
 
 
 def study_of(design: Design) -> Study:
@@ -188,84 +188,56 @@ class _Written:
     motor: str | None = None
 
 
-@dataclass(frozen=True)
-class _Asked:
-    """The requirements of a study, and the lines of its keys."""
-
-    requirements: list[Tree]
-    where: str
-    lines: Mapping[str, int]
-
-    def of(self, design: Design) -> Design:
-        """The design with them, in place of its own with the same id."""
-        if not self.requirements:
-            return design
-        tree = design_tree(design)
-        replaced = [item.get("id") for item in self.requirements]
-        kept = [item for item in tree.get("requirement", []) if item.get("id") not in replaced]
-        tree["requirement"] = [*self.requirements, *kept]  # numbered as in the study
-        return design_from_tree(tree, design.origin or design.name, Findings(self.where, self.lines))
-
-
-def _study(root: Table, asked: _Asked, folder: Path, *, keep_going: bool) -> Study:
-    """Build a study from its tree; designs are looked for beside the file."""
-    where, head = root.origin, root.table("study").read(_Head)
-    base = asked.of(_design(head.base, folder))
-    variants = list[Variant]()
-    for variant in _Maker(base, where, folder, asked, keep_going).made(root):
-        variants.append(variant)
-        STUDY_VARIANTS.check(len(variants), where)
-    first = Variant(base.name, slug(base.name), base)
-    for name, times in Counter(variant.name for variant in (first, *variants)).items():
-        if times > 1:
-            raise InputError(f"variant.name = {shown(name)}: twice; allowed: names that differ", where=where)
-    name = _name(root.table("study"), base.name if head.name is None else head.name)
-    plan = _plan(root.table("monte_carlo")) if "monte_carlo" in root else None
-    about = (name, head.title, head.description, where)
-    nightly = root.table("nightly").data
-    return Study(*about, first, tuple(variants), head.validation, plan, nightly)
-
-
 def _name(table: Table, name: str) -> str:
     if not 0 < len(name.strip()) <= len(name) <= LONGEST_NAME:
         raise table.fail("name", f"allowed: a text of 1 to {LONGEST_NAME} characters")
     return name
 
 
-def _plan(table: Table) -> MonteCarloPlan:
-    plan = table.read(MonteCarloPlan)
-    for name, least, most in (("samples", 1, SAMPLES.most), ("seed", 0, 2**63 - 1)):
-        if not least <= getattr(plan, name) <= most:
-            raise table.fail(name, f"allowed: a whole number, {least} to {most}")
-    return plan
-
-
-def _design(name: str, folder: Path) -> Design:
-    """A shipped design by name, or a design file beside the study file."""
-    return load_design(name if name in shipped_designs() else folder / name)
-
-
-def _located(place: str, where: str, make: Callable[[], Design]) -> Design:
-    """Call something whose errors shall name the study file and a place in it."""
-    try:
-        return make()
-    except InputError as error:
-        each = getattr(error, "mistakes", [error])
-        told = [one.message if one.where == where else str(one) for one in each]
-        raise as_one([InputError(f"{place}: {one}", where=where) for one in told]) from error
-
-
 @dataclass(frozen=True)
 class _Maker:
-    base: Design
-    where: str
-    folder: Path
-    asked: _Asked
+    """Makes a study of its file."""
+
+    root: Table
+    asked: list[Tree]  # the study's own requirements
+    lines: Mapping[str, int]  # of its keys
+    folder: Path  # where designs are looked for: beside the file
     keep_going: bool
 
-    def made(self, root: Table) -> Iterator[Variant]:
+    def study(self) -> Study:
+        root, head = self.root, self.root.table("study").read(_Head)
+        base, variants = self._design(head.base), list[Variant]()
+        for variant in self._variants(base):
+            variants.append(variant)
+            STUDY_VARIANTS.check(len(variants), root.origin)
+        first = Variant(base.name, slug(base.name), base)
+        for name, times in Counter(variant.name for variant in (first, *variants)).items():
+            if times > 1:
+                told = f"variant.name = {shown(name)}: twice; allowed: names that differ"
+                raise InputError(told, where=root.origin)
+        name = _name(root.table("study"), base.name if head.name is None else head.name)
+        table, plan = root.table("monte_carlo"), None
+        if "monte_carlo" in root:
+            plan = table.read(MonteCarloPlan)
+            for key, least, most in (("samples", 1, SAMPLES.most), ("seed", 0, 2**63 - 1)):
+                if not least <= getattr(plan, key) <= most:
+                    raise table.fail(key, f"allowed: a whole number, {least} to {most}")
+        about, nightly = (name, head.title, head.description, root.origin), root.table("nightly").data
+        return Study(*about, first, tuple(variants), head.validation, plan, nightly)
+
+    def _design(self, name: str) -> Design:
+        """A shipped design by name, or a file; with the requirements in place of its own with the same id."""
+        design = load_design(name if name in shipped_designs() else self.folder / name)
+        if not self.asked:
+            return design
+        tree, replaced = design_tree(design), [item.get("id") for item in self.asked]
+        kept = [item for item in tree.get("requirement", []) if item.get("id") not in replaced]
+        tree["requirement"] = [*self.asked, *kept]  # numbered as in the study
+        return design_from_tree(tree, design.origin or design.name, Findings(self.root.origin, self.lines))
+
+    def _variants(self, base: Design) -> Iterator[Variant]:
         """All of a file: variants, then sweeps, then grids; a sweep is a grid of one axis."""
-        for table in root.tables("variant"):
+        for table in self.root.tables("variant"):
             one = table.read(_Written, beside=("override",))
             overrides = dict(table.table("override").data)
             if one.motor is not None:
@@ -274,34 +246,36 @@ class _Maker:
                     message = "no [motor] table; allowed: a TOML file with one"
                     raise InputError(message, where=shown_path(one.motor))
                 overrides = {"motor": motor, **overrides}
-            yield self._made(_name(table, one.name), overrides, one.base)
-        for table in root.tables("sweep"):
-            yield from self._points(table, [table])
-        for table in root.tables("grid"):
+            yield self._made(_name(table, one.name), overrides, base, one.base)
+        for table in self.root.tables("sweep"):
+            yield from self._points(table, [table], base)
+        for table in self.root.tables("grid"):
             table.only(("axes",))
-            yield from self._points(table, table.tables("axes"))
+            yield from self._points(table, table.tables("axes"), base)
 
-    def _points(self, table: Table, axes: list[Table]) -> Iterator[Variant]:
+    def _points(self, table: Table, axes: list[Table], base: Design) -> Iterator[Variant]:
+        where = self.root.origin
         if not axes:
-            raise InputError(f"{table.path}.axes: no axis; allowed: 1 to {GRID_AXES.most}", self.where)
-        GRID_AXES.check(len(axes), self.where, name=f"{table.path}.axes")
-        values = [_values(axis, self.base) for axis in axes]
-        STUDY_VARIANTS.check(prod(map(len, values)), self.where, name=table.path)
+            raise InputError(f"{table.path}.axes: no axis; allowed: 1 to {GRID_AXES.most}", where)
+        GRID_AXES.check(len(axes), where, name=f"{table.path}.axes")
+        values = [_values(axis, base) for axis in axes]
+        STUDY_VARIANTS.check(prod(map(len, values)), where, name=table.path)
         for point in product(*values):
             overrides = {axis.data["parameter"]: value for axis, value in zip(axes, point, strict=True)}
-            yield self._made(", ".join(f"{key} = {value}" for key, value in overrides.items()), overrides)
+            name = ", ".join(f"{key} = {value}" for key, value in overrides.items())
+            yield self._made(name, overrides, base)
 
-    def _made(self, name: str, overrides: Tree, origin: str | None = None) -> Variant:
-        def make() -> Design:
-            start = self.base
-            if origin is not None:
-                start = self.asked.of(_design(origin, self.folder))
-            return with_overrides(start, overrides) if overrides else start
-
+    def _made(self, name: str, overrides: Tree, base: Design, origin: str | None = None) -> Variant:
+        """A variant; what refuses it names the study file and the variant."""
+        where = self.root.origin
         try:
-            design = _located(f"variant {shown(name)}", self.where, make)
+            start = base if origin is None else self._design(origin)
+            design = with_overrides(start, overrides) if overrides else start
         except InputError as error:
+            each = getattr(error, "mistakes", [error])
+            told = [one.message if one.where == where else str(one) for one in each]
+            refused = as_one([InputError(f"variant {shown(name)}: {one}", where=where) for one in told])
             if not self.keep_going:
-                raise
-            return Variant(name, slug(name), None, overrides, str(error))
+                raise refused from error
+            return Variant(name, slug(name), None, overrides, str(refused))
         return Variant(name, slug(name), design, overrides)

@@ -32,10 +32,7 @@ class Asked(OnMachines):
 
 
 def compared(study: Study | None, asked: Asked, *, out: Path, progress: Progress = None) -> Comparison:
-    """Compare the variants of a study; what is found of each design is kept under ``out``.
-
-    Raises `InputError`: without a study.
-    """
+    """Compare the variants of a study, what is found kept under ``out``; `InputError` without a study."""
     if study is None:
         raise InputError("compare: give a study file or a design; --example prints a study file")
     from analyses.comparison.variants import compare

@@ -19,11 +19,9 @@ Aim = Literal["least-change", "reserve"]
 class TuningSettings:
     """What tuning is to do; the words of `Asked`, read."""
 
-    # In place of those of the design on the same figure of the same loop
-    requirements: tuple[Requirement, ...] = ()
+    requirements: tuple[Requirement, ...] = ()  # in place of the design's on the same figure of a loop
     rounded: bool = True
-    # Whether the trade-off curve and the nonlinear check are wanted
-    curve: bool = True
+    curve: bool = True  # the trade-off curve; and the nonlinear check
     check: bool = True
     aim: Aim = "least-change"
     place: tuple[str, ...] = ()  # of `analyses.tuning.start.ELEMENTS`

@@ -1,11 +1,9 @@
 """The least change that meets the requirements: the nearest point of what is allowed to the design as it is.
 
-Minimise the change (`analyses.tuning.start.change`: squares of ln ratios of gains, of shares fed forward)
-with every requirement met at every corner of the working set: sequential quadratic programming from the
-design itself, and from gains with reserve (`solve`) where that finds nothing. As margins have kinks (another
-crossover becomes the worst) and what is allowed may fall apart, differential evolution (Storn and Price 1997)
-then searches the box that holds all that is nearer, and the descent begins again from what it finds; each
-value is taken back towards home by itself. What is returned meets every corner, or is the best compromise.
+Sequential quadratic programming on the change (`analyses.tuning.start.change`) from the design, and from
+gains with reserve (`solve`) where that finds nothing. As margins have kinks and what is allowed may fall
+apart, differential evolution (Storn and Price 1997) then searches the box that holds all that is nearer, and
+the descent begins again; each value is taken back towards home by itself.
 """
 
 import numpy as np
@@ -25,10 +23,7 @@ BACK = np.linspace(0.0, 1.0, 17)[1:]
 
 
 def least_change(problem: Problem, *, give_up: bool = False) -> Solution:
-    """The nearest gains that meet every requirement at every corner; the best compromise where none do.
-
-    With ``give_up`` it stops where already the nominal design misses a limit.
-    """
+    """The nearest gains that meet every requirement at every corner, else the best compromise (`solve`)."""
     corners = problem.all_corners
     result = problem.distances(problem.present[None, :], corners)[0]
     if result.min() >= 0.0:
@@ -46,24 +41,23 @@ def least_change(problem: Problem, *, give_up: bool = False) -> Solution:
 
 
 def _met(problem: Problem, firm: Floats | None, working: Floats) -> Solution | None:
-    """Nearest gains, the working set growing until they meet every corner; None where there are none."""
+    """Nearest gains, the working set growing until they meet every corner, as ``firm`` does; None: none."""
+
+    def nearest(start: Floats | None, working: Floats) -> Floats | None:
+        begins = [row for row in (problem.present, firm if start is None else start, firm) if row is not None]
+        best = _nearer(problem, firm, np.vstack([_descend(problem, row, working) for row in begins]), working)
+        if best is None:
+            return None
+        drawn = _evolved(problem, best, working)
+        best = _nearer(problem, best, np.vstack([drawn, _descend(problem, drawn, working)]), working)
+        assert best is not None
+        return _taken_back(problem, best, working)
+
     last: Solution | None = None
-    for last in rounds(problem, working, lambda gains, corners: _nearest(problem, gains, firm, corners)):
+    for last in rounds(problem, working, nearest):
         if last.slack >= 0.0:
             break
     return last
-
-
-def _nearest(problem: Problem, start: Floats | None, firm: Floats | None, working: Floats) -> Floats | None:
-    """Nearest gains to home that meet the working set; those of `firm` are known to. None without any."""
-    begins = [row for row in (problem.present, firm if start is None else start, firm) if row is not None]
-    best = _nearer(problem, firm, np.vstack([_descend(problem, row, working) for row in begins]), working)
-    if best is None:
-        return None
-    drawn = _evolved(problem, best, working)
-    best = _nearer(problem, best, np.vstack([drawn, _descend(problem, drawn, working)]), working)
-    assert best is not None
-    return _taken_back(problem, best, working)
 
 
 def _descend(problem: Problem, start: Floats, working: Floats) -> Floats:

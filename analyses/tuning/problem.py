@@ -41,8 +41,7 @@ class Problem:
     elements: tuple[Element, ...] = ()  # that were added
     most: int = MOST_DESIGNS  # designs that a search may look at
     evaluations: int = 0  # that were looked at so far
-    # Of the variables: dotted keys; SI values from which a search begins, that the design has (of an added
-    # element neutral ones), and ends of what may be set
+    # Of the variables: keys; SI values to begin at, of the design (neutral if new); ends of what may be set
     paths: tuple[str, ...] = field(init=False)
     start: Floats = field(init=False)
     present: Floats = field(init=False)
@@ -101,11 +100,7 @@ class Problem:
 
     @cached_property
     def all_corners(self) -> Floats:
-        """Nominal point, then the corners of the tolerance box, shape (corners, factors).
-
-        Of correlated parameters the corners are moved as they are correlated (the root of their correlation
-        matrix times the signs, within the box): two that are one go up and down together.
-        """
+        """Nominal point, then corners of the tolerance box as they are correlated, (corners, factors)."""
         size, nominal = len(self.factors), np.array([[f.nominal for f in self.factors]])
         if not size:
             return nominal
@@ -167,11 +162,7 @@ class Problem:
         return Population(self.design, self.values_at(gains, corners, factors), count)
 
     def values_at(self, gains: Floats, corners: Floats, factors: tuple[Factor, ...]) -> dict[str, Floats]:
-        """SI values of every candidate at every corner by dotted key, each of shape (candidates * corners).
-
-        Corners say where a gain lies about what the design has; about a candidate it lies as far away, by the
-        same share where its tolerance is in percent.
-        """
+        """SI values of every candidate at every corner by key, (candidates * corners); gains about it."""
         chosen = {p: np.repeat(gains[:, k], len(corners)) for k, p in enumerate(self.paths)}
         moved = as_values(self.design, [f.path for f in factors], np.tile(corners, (len(gains), 1)))
         values = {**chosen, **moved}
@@ -195,10 +186,7 @@ def asked_for(design: Design, extra: tuple[Requirement, ...] = ()) -> tuple[Requ
 
 
 def gain_requirements(design: Design, extra: tuple[Requirement, ...] = ()) -> tuple[Requirement, ...]:
-    """Those of `asked_for` that the search looks at: on loops, and the rate that a P velocity loop bounds.
-
-    Raises `InputError`: without any.
-    """
+    """Those of `asked_for` on loops, and on the rate of a P velocity loop; `InputError` without any."""
     moved = {*LOOP_QUANTITIES, *([] if droop(design) is None else ["output_rate"])}
     every = asked_for(design, extra)
     chosen = tuple(r for r in every if r.quantity in moved and in_populations(r, design))
@@ -215,10 +203,7 @@ def problem_of(
     elements: tuple[Element, ...] = (),
     most: int = MOST_DESIGNS,
 ) -> Problem:
-    """Set the problem up: which gains the design has, where they may lie, with the variables of new elements.
-
-    The search starts from ``start`` (by rules, SI); another gain of the design starts where it is.
-    """
+    """The problem: gains and new elements, searched from ``start`` (by rules, SI) or where they are."""
     design, placed = place(design, elements)
     variables = []
     for path in (path for path in GAINS if path in set(paths_of(design))):

@@ -30,8 +30,7 @@ class BindingRequirement:
     id: str
     label: str
     unit: str
-    # Worst over the corners; distance positive where met
-    value: float | None
+    value: float | None  # worst over the corners; its distance is positive where met
     limit: float
     distance: float | None
     relative: float  # distance over the limit's size: what tuning makes as even as it can
@@ -45,8 +44,7 @@ class GainSetting:
 
     path: str
     unit: str
-    # SI; None for a value of an added element, and for one that no rule gives
-    before: float | None
+    before: float | None  # SI; None of an added element, or without a rule
     by_rule: float | None
     tuned: float  # SI
     object: str  # label of the motion controller's object; empty where the design has none
@@ -82,8 +80,7 @@ class TuningResult:
     """A tuned design."""
 
     feasible: bool  # whether all that is searched for is met at every corner, with the rounded gains
-    # As it came, and with the rounded gains
-    before: Design
+    before: Design  # as it came; then with the rounded gains
     design: Design
     gains: tuple[GainSetting, ...]
     requirements: tuple[BindingRequirement, ...]
@@ -95,8 +92,7 @@ class TuningResult:
     notes: tuple[str, ...]
     aim: Aim = "least-change"
     placed: tuple[str, ...] = ()  # elements that were added, because gains alone do not meet the requirements
-    # What was searched for, by certified margins: the tuned design, and each worst corner of one
-    confirmed: tuple[RequirementVerdict, ...] = ()
+    confirmed: tuple[RequirementVerdict, ...] = ()  # what was searched for, also at each worst corner
     others: tuple[RequirementVerdict, ...] = ()  # all other requirements, of the tuned design
     spent: bool = False  # whether the search ended at its bound: then there may be something better
     hunting: str = ""  # after which step the tuned drive does not come to rest; empty: it does
@@ -125,11 +121,7 @@ class TuningResult:
 def confirm(
     tuned: Design, requirements: tuple[Requirement, ...], binding: tuple[BindingRequirement, ...]
 ) -> tuple[RequirementVerdict, ...]:
-    """Judge every requirement of the tuned design, and of some their worst corners, by certified margins.
-
-    The search asks the many-designs figures; this asks what ``margins`` asks. ``binding`` holds the
-    ``requirements`` at their worst corners.
-    """
+    """Judge every requirement of the tuned design, some at their worst corners, as ``margins`` does."""
     timed = any(QUANTITIES[item.quantity].timed for item in requirements)
     rows: dict[tuple[tuple[str, float], ...], list[Requirement]] = {}
     for item, result in zip(requirements, binding, strict=True):

@@ -1,10 +1,9 @@
 """The optimiser: the largest common distance to all requirements, corner by corner as it needs them.
 
-Maximise t, up to a reserve of 30 %, with every requirement at every corner of the working set at least t
-away from its limit (relative to the limit's size), by sequential quadratic programming (Kraft 1988, SLSQP)
-with central differences of all gains in one compiled batch. Then all corners are looked at, the worst join
-the working set, and again.  Deviation from the rule gains costs a little, so that among all gains with that
-reserve those nearest to the rules are taken: margins beyond it are not worth a loop that only saturates.
+Maximise t, up to a reserve of 30 %, with every requirement at every corner of the working set at least t away
+from its limit, by sequential quadratic programming (Kraft 1988, SLSQP), central differences of all gains in
+one batch; the worst of all corners join, and again. Deviation from the rule gains costs a little: among all
+gains with that reserve those nearest to the rules are taken.
 """
 
 from collections.abc import Callable, Iterator
@@ -39,10 +38,7 @@ Seeking = Callable[[Floats | None, Floats], Floats | None]
 
 
 def rounds(problem: Problem, working: Floats, seek: Seeking) -> Iterator[Solution]:
-    """Solutions on a working set that grows by the corners that each of them misses.
-
-    ``seek`` gives gains from those of the round before (None in the first) and the working set; None ends it.
-    """
+    """Solutions on a working set that grows by corners that are missed, until ``seek`` gives no gains."""
     corners, gains = problem.all_corners, None
     for _ in range(ROUNDS):
         if (gains := seek(gains, working)) is None:
@@ -56,10 +52,7 @@ def rounds(problem: Problem, working: Floats, seek: Seeking) -> Iterator[Solutio
 
 
 def solve(problem: Problem, *, give_up: bool = False) -> Solution:
-    """Maximise the smallest relative distance to the limits over all corners.
-
-    With ``give_up`` it stops where already the nominal design misses a limit.
-    """
+    """Maximise the smallest distance over all corners; or ``give_up`` where the nominal design fails."""
 
     def seek(gains: Floats | None, working: Floats) -> Floats:
         starts = start_points(problem, working) if gains is None else gains[None, :]
@@ -109,8 +102,7 @@ class Program:
     """Functions of the coordinates with their central differences, all from one compiled batch."""
 
     problem: Problem
-    # (candidates, coordinates) -> (candidates, functions)
-    goals: Functions
+    goals: Functions  # (candidates, coordinates) -> (candidates, functions)
     limits: Functions | None = None
     seen: list[tuple[Floats, float]] = field(default_factory=list, repr=False)
     aims: int = 0  # how many functions are goals, the first ones
@@ -179,10 +171,7 @@ _MET = -1e-3
 
 
 def trade_off(problem: Problem, gains: Floats, working: Floats) -> tuple[TradeOffPoint, ...]:
-    """Largest smallest phase margin (all loops, worst corner) for position bandwidths around the tuned one.
-
-    From gains in SI; the result holds for the corners that are looked at, ``working``.
-    """
+    """Largest smallest phase margin (all loops, ``working`` corners) at bandwidths about the tuned one."""
     others = [
         k for k, r in enumerate(problem.requirements)
         if r.quantity != "phase_margin" and not (r.quantity == "bandwidth" and r.loop in ("position", None))

@@ -1,9 +1,7 @@
 """Where tuning begins, and what it may set.
 
-Closed-form gains that drive engineers start from, from the inner loop out; gains as the motion controller's
-objects hold them; and elements that may be added. A notch, a low-pass, feed-forward of a velocity loop are
-neutral until they are needed: a notch of depth 1, a low-pass at the end of the band, no feed-forward. The
-distance from there is what they cost, in the same measure as a gain (`change`).
+Closed-form gains, as the motion controller's objects hold them; elements that may be added, neutral at first:
+a notch of depth 1, a low-pass at the end of the band, no feed-forward. `change` says what they cost.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -28,19 +26,14 @@ SEPARATION = 4.0  # crossover of the velocity loop over the gain of the position
 
 
 def magnitude_optimum(gain: float, time_constant_s: float, small_time_s: float) -> tuple[float, float]:
-    """PI (gain, integral time) for ``gain/(1 + s T1)`` behind small delays of T_sigma in sum.
-
-    The zero cancels T1 and the loop becomes ``1/(2 T_sigma s (1 + s T_sigma))``: damping 0.707, overshoot
-    4.3 %. Kessler 1958 (Betragsoptimum).
-    """
+    """PI (gain, integral time) for ``gain/(1 + s T1)`` behind T_sigma: damping 0.707. Kessler 1958."""
     return time_constant_s / (2.0 * gain * small_time_s), time_constant_s
 
 
 def symmetric_optimum(integrator_gain: float, small_time_s: float, a: float = 2.0) -> tuple[float, float]:
-    """PI (gain, integral time) for ``k/s`` behind a small time constant T_sigma.
+    """PI (gain, integral time) for ``k/s`` behind a small time constant T_sigma. Kessler 1958.
 
-    Crossover at 1/(a T_sigma) where the phase is highest, Tn = a^2 T_sigma; a = 2 is the usual choice.
-    Phase margin ``arctan(a) - arctan(1/a)``: 36.9 deg for a = 2, 60 deg for 2 + sqrt(3). Kessler 1958.
+    Crossover at 1/(a T_sigma), Tn = a^2 T_sigma; phase margin ``arctan(a) - arctan(1/a)``.
     """
     return 1.0 / (a * integrator_gain * small_time_s), a * a * small_time_s
 
@@ -56,8 +49,7 @@ class RuleGains:
 def rule_gains(design: Design) -> RuleGains:
     """Start gains of every loop that a design has; a law of one's own stays, the others are tuned around it.
 
-    Current: magnitude optimum with T_sigma = d + T/2. Velocity: symmetric optimum for 60 deg, with the
-    current loop as a lag 2 T_sigma, its own hold, and what the speed measurement costs. Position: the
+    Current: magnitude optimum with T_sigma = d + T/2. Velocity: symmetric optimum for 60 deg. Position: the
     velocity loop's crossover over `SEPARATION`. Where a stage is missing, the next one takes its place.
     """
     values, steps, own = dict[str, float](), list[str](), design.controller.own_law
@@ -129,10 +121,7 @@ def allowed_range(design: Design, path: str) -> tuple[float, float]:
 
 
 def neighbours(design: Design, paths: tuple[str, ...], gains: Floats) -> Floats:
-    """All roundings of gains to the steps of their objects, up and down, shape (roundings, gains).
-
-    A gain without an object stays as it is.
-    """
+    """Roundings of gains to steps of their objects, where they have one, shape (roundings, gains)."""
     choices = []
     for path, value in zip(paths, gains, strict=True):
         step = step_of_gain(design, path)
@@ -162,8 +151,7 @@ class Variable:
     high: float
     home: float | None  # value that costs nothing; None where every value does
     linear: bool = False  # whether it counts by itself (a share that may be 0), and not by its logarithm
-    # Path of a variable that it is measured against (the width of a notch against its frequency)
-    per: str = ""
+    per: str = ""  # path of what it is measured against (of the width of a notch its frequency)
 
 
 def checked(design: Design, wanted: Sequence[str]) -> tuple[Element, ...]:
@@ -185,7 +173,10 @@ def place(design: Design, elements: tuple[Element, ...]) -> tuple[Design, list[V
     variables: list[Variable] = []
     for element in elements:
         if element == "feedforward":
-            variables += _feedforward(design)
+            position = design.controller.position_loop
+            for key in ("feedforward", "acceleration_feedforward"):
+                v = getattr(position, key)
+                variables.append(Variable(f"control.position.{key}", v, 0.0, max(1.2, v), v, linear=True))
             continue
         (item, own), velocity = _filter(design, element), part_at(design, "control.velocity")
         filters = (*velocity.filters, item)
@@ -196,11 +187,7 @@ def place(design: Design, elements: tuple[Element, ...]) -> tuple[Design, list[V
 
 
 def _filter(design: Design, element: Element) -> tuple[Filter, list[Variable]]:
-    """A neutral filter, from Nyquist of the velocity loop (90 % of it) three decades down.
-
-    A notch begins at the resonance of motor and load on the coupling, without damping; without one in the
-    middle of the band.
-    """
+    """A neutral filter in the three decades below 90 % of Nyquist; a notch begins at a resonance."""
     high = END_OF_BAND * pi / design.controller.period_of("velocity")
     low = high / 1000.0
     if element == "lowpass":
@@ -216,17 +203,8 @@ def _filter(design: Design, element: Element) -> tuple[Filter, list[Variable]]:
     ]
 
 
-def _feedforward(design: Design) -> list[Variable]:
-    position = design.controller.position_loop
-    own = {key: getattr(position, key) for key in ("feedforward", "acceleration_feedforward")}
-    return [Variable(f"control.position.{k}", v, 0.0, max(1.2, v), v, linear=True) for k, v in own.items()]
-
-
 def change(variables: tuple[Variable, ...], values: Floats) -> Floats:
-    """How far values are from home: squares of ln ratios, of shares, and of widths over their frequency.
-
-    Of rows in SI, shape (candidates, variables); shape (candidates,).
-    """
+    """Squares of ln ratios, of shares, of widths over frequency, from home, for rows in SI; (candidates,)."""
     places = {v.path: k for k, v in enumerate(variables)}
     total = np.zeros(len(values))
     for k, item in enumerate(variables):

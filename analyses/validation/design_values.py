@@ -1,9 +1,8 @@
 """Every number of a design that no small signal sees, confronted once by an exact question.
 
-Friction, breakaway, play and inertias (`torque_values`), limits, overload, supply (`limit_values`), and here
-the profile and feed-forward of a command and counts: the compiled tick starts in a state in which the number
-decides what comes out of one tick, and the prediction is a formula of the model.  Nothing is waited for.
-Noise, jitter and their seed are left: they are random.
+The tick starts in a state in which the number decides what comes out, predicted by a formula of the model:
+friction, play and inertias (`torque_values`), limits and supply (`limit_values`), here profile, feed-forward
+and counts. Noise, jitter and their seed are left: they are random.
 """
 
 from collections.abc import Iterator

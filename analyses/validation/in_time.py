@@ -1,16 +1,13 @@
 """Linear predictions shown in time: one small step, runs beside each margin, sines injected into each loop.
 
-The step is injected at the place on the operating motion; the simulated answer is held against the linear one
-at every sample.  Beside a gain margin K the drive is started on the critical mode of its own tangent, at
-K (1 - BESIDE) and K (1 + BESIDE), multiplied at the place: with v the mode and w its left eigenvector,
-``w^H (s - s_calm)`` is multiplied by the predicted eigenvalue in every period, exactly.  No window is
-searched, nothing waited for.  A sine begins in the steady state that it has by the tangent, its fundamentals
-correlated over whole periods: what a frequency-response analyser on the bench would see.
+Beside a gain margin K the drive is started on the critical mode of its own tangent, at K (1 -+ BESIDE): with
+v the mode and w its left eigenvector, ``w^H (s - s_calm)`` is multiplied by the predicted eigenvalue in every
+period, exactly. A sine begins in its steady state by the tangent, its fundamentals correlated over whole
+periods.
 """
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import partial
 from math import ceil, log
 from typing import Any
 
@@ -19,7 +16,6 @@ import numpy.typing as npt
 from scipy.linalg import eig
 
 from actuator_lti.errors import NumericalError
-from actuator_lti.systems.plain_system import PlainSystem
 from actuator_lti.systems.resolvent import balanced
 from actuator_lti.types import Complexes, Floats
 from analyses.validation.places import Bench
@@ -81,9 +77,21 @@ def step_shown(bench: Bench, name: str) -> StepShown | None:
         return None
     setup, closed = bench.setup(name), figures.loop.plain_closed
     samples = int(min(max(SETTLINGS * figures.step.settling_time_s / closed.dt, 20.0), MOST_SAMPLES))
-    linear = _linear_step(closed, samples)
+    x, linear = np.zeros(len(closed.A)), np.empty(samples)
+    for k in range(samples):
+        linear[k] = float(closed.C[0] @ x + closed.D[0, 0])
+        x = closed.A @ x + closed.B[:, 0]
     largest = float(np.max(np.abs(linear)))
-    simulated, own = agreed(partial(_step, setup, samples), setup, WITHIN / SURE * largest)
+
+    def stepped(size: float) -> Floats | None:
+        """What comes back, negated, from a step at the place; None after an event."""
+        rows = setup.rows()
+        rows.step(setup.point, size, -1.0)
+        drive = rows.running()
+        piece = drive.advance(samples * setup.hold_ticks, setup.hold_ticks)
+        return -drive.returned(piece, setup.point) if drive.happened == (0.0, 0.0) else None
+
+    simulated, own = agreed(stepped, setup, WITHIN / SURE * largest)
     off = np.abs(simulated - linear) / largest
     k = int(np.argmax(off))
     allowed = max(WITHIN, SURE * own / largest)
@@ -96,20 +104,10 @@ def step_shown(bench: Bench, name: str) -> StepShown | None:
     return StepShown(name, time_s, simulated, linear, replace(row, predicted=None, found=None))
 
 
-def _linear_step(closed: PlainSystem, samples: int) -> Floats:
-    x, out = np.zeros(len(closed.A)), np.empty(samples)
-    for k in range(samples):
-        out[k] = float(closed.C[0] @ x + closed.D[0, 0])
-        x = closed.A @ x + closed.B[:, 0]
-    return out
-
-
 def agreed(run: Callable[[float], Numbers | None], setup: LoopSetup, enough: float) -> tuple[Numbers, float]:
     """What a run by its size comes to, over that of none, and what two successive sizes differ in.
 
-    The largest size of which two agree well enough, else where they agree best; a size that ends in an event
-    is none.  A tangent's steps (`nonlinear.bench.differences`) begin where what bends says.  How far a whole
-    run moves is not known before it is run: large ones may pass many periods of a torque.
+    The largest size of which two agree well enough, else where they agree best; none ends in an event.
     """
     calm, large = run(0.0), setup.range if np.isfinite(setup.range) else 1.0
     last: Numbers | None = None
@@ -129,15 +127,6 @@ def agreed(run: Callable[[float], Numbers | None], setup: LoopSetup, enough: flo
     if best is None:
         raise NumericalError("every run ends in an event: no operating motion without one")
     return best
-
-
-def _step(setup: LoopSetup, samples: int, size: float) -> Floats | None:
-    """What comes back, negated, from a step at the place; None after an event."""
-    rows = setup.rows()
-    rows.step(setup.point, size, -1.0)
-    drive = rows.running()
-    piece = drive.advance(samples * setup.hold_ticks, setup.hold_ticks)
-    return -drive.returned(piece, setup.point) if drive.happened == (0.0, 0.0) else None
 
 
 def margin_shown(bench: Bench, place: Place) -> MarginShown | None:
@@ -229,18 +218,13 @@ class BenchSweep:
 
 def bench_sweep(bench: Bench, place: Place) -> BenchSweep:
     setup, hold_s = bench.setup(place.name), place.tangent.hold_s
-    shares = np.geomspace(LOWEST, HIGHEST, FREQUENCIES)
-    turns = sorted({_turns(share) for share in shares}, key=lambda turn: turn[0] / turn[1])
+    shares = np.geomspace(LOWEST, HIGHEST, FREQUENCIES).tolist()
+    whole = [(max(1, round(0.5 * share * SAMPLES)), share) for share in shares]  # cycles of a run
+    turns = sorted({(n, ceil(2.0 * n / share)) for n, share in whole}, key=lambda turn: turn[0] / turn[1])
     angles = np.array([2.0 * np.pi * cycles / samples for cycles, samples in turns])
     found = [_found(setup, place, angle, samples) for angle, (_, samples) in zip(angles, turns, strict=True)]
     linear = np.asarray(bench.loop(place.name).plain_open(np.exp(1j * angles)), complex)
     return BenchSweep(place.name, angles / (2.0 * np.pi * hold_s), np.array(found), linear)
-
-
-def _turns(share: float) -> tuple[int, int]:
-    """Whole cycles and samples of a run at about a share of Nyquist."""
-    cycles = max(1, round(0.5 * share * SAMPLES))
-    return cycles, ceil(2.0 * cycles / share)
 
 
 def _found(setup: LoopSetup, place: Place, angle: float, samples: int) -> complex:

@@ -1,7 +1,4 @@
-"""Limits, what integrals do there, overload, supply and resolution, each confronted by one update.
-
-A limit is asked for with the others lifted, by a command far beyond it: the state holds what is left.
-"""
+"""Limits, integrals there, overload, supply and resolution: each by one update far beyond it, alone."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace

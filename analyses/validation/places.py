@@ -1,13 +1,11 @@
 """The places of a drive that are judged: its loops, its break points, the command and the load.
 
-Loops stand on the operating motion that `nonlinear.bench.operating_motion` chooses, without counts, noise and
-supply, which are no part of a loop.  The linear writing may be that of another drive, the ``model``: a wrong
-one shows what a validation sees.
+Loops have no counts, noise or supply. The linear writing may be that of another drive, the ``model``.
 """
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
-from functools import cached_property, partial
+from functools import cached_property
 from math import inf, isfinite
 
 import numpy as np
@@ -50,10 +48,7 @@ class Bench:
         return on_its_stand(on_the_bench(self.model), self.design)
 
     def setup(self, name: str) -> LoopSetup:
-        """How a place is tested; without limits, and without the filter of the command but at the command.
-
-        A filter lags behind a ramp: the drive stands then; where it has no slope about rest it is left out.
-        """
+        """How a place is tested, without limits; the command with its filter where the drive then stands."""
         if name not in self._setups:
             setup = loop_setup(self.drive, name, limits_on=False, held=name == "current")
             if name == "command" and self._filtered:
@@ -112,12 +107,8 @@ class Bench:
         """Figures of the loops with the outer ones open, by stage."""
         return {name: loop_figures(self.loop(name)) for name in wire(self.design).stages}
 
-    def places(self) -> Iterator[Place]:
-        """All of them; a tangent is measured as each is asked for."""
-        for name in self.names:
-            yield self.place(name)
-
     def place(self, name: str) -> Place:
+        """One of `names`, its tangent measured."""
         setup = self.setup(name)
         found = self._tangent(name, setup)
         if name in self.figures:
@@ -145,17 +136,17 @@ class Bench:
         return replace(self._tangents[key], place=name)
 
     def onsets(self) -> Iterator[Place]:
-        """From the command to what stands in front of each limiter, at its last update before the next one.
-
-        The amplitude at which a limiter first acts is its limit over that response.
-        """
+        """From the command to what stands in front of each limiter, at its last update before the next."""
         setup, loops = self.setup("command"), self.loops("command")
-        for (limiter, k, seen), found in zip(self._watched, self._from_command[1:], strict=True):
+        for (limiter, k, seen), t in zip(self._watched, self._from_command[1:], strict=True):
             name = f"{limiter.limiter.name}_onset".replace("-", "_")
             path = loops.limiters[limiter.limiter.name]
+
+            def last(z: Complexes, path: LimiterPath = path, s: float = t.hold_s, k: int = k) -> Complexes:
+                return np.asarray(path.responses(np.angle(z) / s)[k], dtype=complex)
+
             yield Place(
-                name="command", condition=setup.condition, tangent=found,
-                predicted=partial(self._last, path, found.hold_s, k),
+                name="command", condition=setup.condition, tangent=t, predicted=last,
                 quantity=name if seen.signal == limiter.signals[0] else f"{name}_integral",
             )  # fmt: skip
 
@@ -175,11 +166,6 @@ class Bench:
         """From the command to the output, and to what stands in front of each limiter, measured at once."""
         seen = [None, *(watched for _, _, watched in self._watched)]
         return list(tangents(self.setup("command"), "command", seen))
-
-    @staticmethod
-    def _last(path: LimiterPath, hold_s: float, k: int, z: Complexes) -> Complexes:
-        """The row of a limiter's path at its last update."""
-        return np.asarray(path.responses(np.angle(z) / hold_s)[k], dtype=complex)
 
     def _path(self, name: str, loops: Loops) -> Callable[[Complexes], Complexes]:
         """Response of the output to command or load; its poles are those of the loops."""

@@ -81,10 +81,7 @@ class Validation:
 
     @property
     def hunting(self) -> Settling | None:
-        """The largest motion that a step of the drive as it is ends in; None: it comes to rest.
-
-        By its one judge (`analyses.motion.settling`), whatever keeps it going: counts, play, friction, load.
-        """
+        """The largest motion that a step of the drive as it is ends in, by whatever cause; None: it rests."""
         return noticed(self.design, self.settlings)
 
     @property

@@ -39,11 +39,7 @@ def judged(
     name: str, loop: str, predicted: float | None, found: float | None, allowed: float, *,
     resolved: bool = True, **words: str,
 ) -> Row:  # fmt: skip
-    """Judge one number: both there and within ``allowed``, or both absent.
-
-    ``resolved`` says whether the measurement is good enough to tell a wrong prediction; ``words`` are unit,
-    reason and condition of the row.
-    """
+    """Judge one number: both within ``allowed`` or both absent; ``resolved``: a wrong one would be told."""
     if predicted is None or found is None:
         error = 0.0 if predicted is found else inf
     else:

@@ -1,15 +1,12 @@
 """Every small-signal prediction judged by the simulator's own derivative (`nonlinear.tangent`).
 
-The tangent T of a place and the linear writing are two linear models of the same drive that share no code.
-Compared are the response at `GRID` and at every figure's own frequency, the poles, every gain and phase
-margin, the delay margin at the voltage, bandwidths and peaks.  What is allowed is 1e-6 of the response, or
-ten times the tangent's stated error, each at its own frequency; for a figure, what that does to it.
-
-A gain margin is a gain K and a point on the unit circle where, with G the tangent over one base period,
+Allowed is 1e-6 of the response, or ten times the tangent's stated error, each at its own frequency; for a
+figure, what that does to it. A gain margin is a gain K and a point on the unit circle where, with G the
+tangent over one base period,
 
     det(I + (K - 1) G(lambda)) = 0,   |lambda| = 1:
 
-there the simulator has a closed-loop pole.  It is solved for K and the angle from the predicted ones; how the
+there the simulator has a closed-loop pole. It is solved for K and the angle from the predicted ones; how the
 pole moves with K says on which side of the circle it lies at K (1 - 1e-6) and at K (1 + 1e-6).
 """
 
@@ -51,8 +48,7 @@ class Place:
     figures: LoopFigures | None = None  # of a loop; its margins are judged where it is not periodic
     exact: ExactMargins | None = None  # of a break point with all loops closed
     critical: Callable[[float], Complexes] | None = None  # eigenvalues over one base period at a gain
-    # Tangent under a longer computing delay, and what gives its predicted poles over one base period; only at
-    # the voltage
+    # Tangent under a longer computing delay, what gives its poles over one base period; at the voltage
     delayed: Callable[[float], tuple[Tangent, Callable[[], Complexes]]] | None = None
     quantity: str = "response"  # name of the row that judges the response
 
@@ -97,9 +93,7 @@ def _response(place: Place) -> Row:
     wanted = place.predicted(z)
     off = relative(place.tangent.closed(z), wanted)
     within = np.maximum(WITHIN, SURE * place.tangent.error_at(z) / sized(wanted))
-    k = int(np.argmax(off / within))
-    if off[k] <= within[k] and np.max(within) > RESOLVED:
-        k = int(np.argmax(within))
+    k = _worst(off, within)
     where = f"worst at {angles[k] / (2.0 * pi * place.tangent.hold_s):.3g} Hz, of {angles.size} frequencies"
     row = place.judged(place.quantity, 0.0, float(off[k]), float(within[k]), 1.0, "1", where)
     return replace(row, predicted=None, found=None, error=float(off[k]))
@@ -126,29 +120,26 @@ def _poles(place: Place) -> Row:
     A, scale = balanced(t.A)
     found, errors, sharp = eigenvalues(A, t.entry_errors[: len(A), : len(A)] / scale[:, None] * scale)
     rounding = ROUNDING * float(np.linalg.norm(A)) / sharp
-    resolved = [
-        (pole, k)
-        for pole in place.poles[np.abs(place.poles) > 0.0]
-        if rounding[k := int(np.argmin(np.abs(found - pole)))] <= WITHIN * abs(pole)
-    ]
-    words = f"{len(resolved)} of {place.poles.size} poles resolved in double precision"
-    off, within, worst = 0.0, WITHIN, 0j
-    for pole, k in resolved:
-        size = abs(pole) * (abs(np.log(complex(pole))) + rounding[k] / (WITHIN * abs(pole)))
-        now, allowed = float(abs(found[k] - pole) / size), max(WITHIN, SURE * float(errors[k] / size))
-        if _worse(now, allowed, off, within):
-            off, within, worst = now, allowed, complex(pole)
-    if worst:
-        words += f"; worst at |z| = {abs(worst):.6g} over {t.period_s:.3g} s"
+    poles = place.poles[np.abs(place.poles) > 0.0]
+    nearest = np.argmin(np.abs(found - poles[:, None]), axis=1)
+    resolved = rounding[nearest] <= WITHIN * np.abs(poles)
+    poles, k = poles[resolved], nearest[resolved]
+    words = f"{poles.size} of {place.poles.size} poles resolved in double precision"
+    off, within = 0.0, WITHIN
+    if poles.size:
+        size = np.abs(poles) * (np.abs(np.log(poles)) + rounding[k] / (WITHIN * np.abs(poles)))
+        each, allowed = np.abs(found[k] - poles) / size, np.maximum(WITHIN, SURE * errors[k] / size)
+        n = _worst(each, allowed)
+        off, within = float(each[n]), float(allowed[n])
+        words += f"; worst at |z| = {abs(poles[n]):.6g} over {t.period_s:.3g} s"
     row = place.judged("poles", 0.0, off, within, 1.0, "1", words)
     return replace(row, predicted=None, found=None, error=off)
 
 
-def _worse(off: float, within: float, other: float, other_within: float) -> bool:
-    """Whether a difference is farther out than another, or, where both are within, less well known."""
-    if off <= within and other <= other_within and max(within, other_within) > RESOLVED:
-        return within > other_within
-    return off / within > other / other_within
+def _worst(off: Floats, within: Floats) -> int:
+    """Which difference is the farthest out; where all are within, but not all resolved, the least known."""
+    k = int(np.argmax(off / within))
+    return int(np.argmax(within)) if off[k] <= within[k] and np.max(within) > RESOLVED else k
 
 
 @dataclass(frozen=True)
@@ -198,8 +189,7 @@ def _crossing(t: Tangent, gain: float, angle: float) -> _Crossing | None:
 def _crossing_at_rest(t: Tangent, gain: float) -> _Crossing | None:
     """The gain at which a real pole passes 1, beside modes at rest that no gain moves, by Newton's method.
 
-    The product of all (pole - 1) is zero there, and smooth where another slow pole lies beside the one that
-    passes; its slope over the product of the others is that of the pole.
+    The product of all (pole - 1) is smooth also where another slow pole lies beside the one that passes.
     """
 
     def at(log_gain: float) -> tuple[Complexes, Floats]:
@@ -225,10 +215,7 @@ def _crossing_at_rest(t: Tangent, gain: float) -> _Crossing | None:
 
 
 def _gain_row(place: Place, name: str, ratio: float, angle: float, outward: int | None) -> Row:
-    """One gain margin: where the tangent's pole crosses, and on which side it lies to either side of it.
-
-    ``outward``: 1 where the pole leaves the circle with rising gain, -1 with falling; None: not said.
-    """
+    """One gain margin: where the tangent's pole crosses, and whether it goes ``outward`` (1, -1) there."""
     t, scale = place.tangent, max(ratio, abs(ratio - 1.0))  # what T = -1/(K - 1) moves K by, at least K
     found = _crossing(t, ratio, angle)
     if found is None:
@@ -256,32 +243,22 @@ def _exact_margins(place: Place, exact: ExactMargins) -> Iterator[Row]:
     gains = (("gain_margin_up", exact.gain_upper, 1), ("gain_margin_down", exact.gain_lower, -1))
     for name, gain, outward in gains if place.figures is None else ():  # else they are among the loop's own
         if 0.0 < gain < np.inf:
-            yield _gain_row(place, name, gain, _angle_on_circle(place.critical(gain)), outward)
-    if exact.delay_s is not None and np.isfinite(exact.delay_s) and place.delayed is not None:
-        yield _delay_row(place, exact.delay_s)
-
-
-def _angle_on_circle(poles: Complexes) -> float:
-    """Angle of the pole nearest to the unit circle, 0 to pi.
-
-    A pole without its conjugate is real: with the mode at rest, which is none of the poles, it was a double
-    one, and rounding split the two into a pair.
-    """
-    pole = poles[int(np.argmin(np.abs(np.abs(poles) - 1.0)))]
-    return float(abs(np.angle(pole if pole.conjugate() in poles else pole.real)))
-
-
-def _delay_row(place: Place, delay_s: float) -> Row:
-    """The computing delay lengthened to either side of its margin: the critical pole lies inside, outside."""
-    assert place.delayed is not None
-    outside, poles = place.delayed(delay_s * (1.0 + BESIDE))
-    critical = max(poles(), key=abs)
+            poles = place.critical(gain)
+            pole = poles[int(np.argmin(np.abs(np.abs(poles) - 1.0)))]
+            # One without its conjugate is real: a double one with the mode at rest, which rounding split
+            angle = np.angle(pole if pole.conjugate() in poles else pole.real)
+            yield _gain_row(place, name, gain, float(abs(angle)), outward)
+    delay_s = exact.delay_s  # lengthened to either side of this the critical pole lies inside, outside
+    if delay_s is None or not np.isfinite(delay_s) or place.delayed is None:
+        return
+    outside, poles_there = place.delayed(delay_s * (1.0 + BESIDE))
+    critical = max(poles_there(), key=abs)
     inside, _ = place.delayed(delay_s * (1.0 - BESIDE))
     sizes = [abs(nearest_pole(each.A, critical)) for each in (inside, outside)]
     rates = np.log(sizes)
     found = delay_s * (1.0 - BESIDE + 2.0 * BESIDE * float(-rates[0] / (rates[1] - rates[0])))
     words = f"spectral radius beside it {sizes[0] - 1.0:+.1e}, {sizes[1] - 1.0:+.1e}"
-    return place.judged("delay_margin", delay_s, found, place.within, delay_s, "s", words)
+    yield place.judged("delay_margin", delay_s, found, place.within, delay_s, "s", words)
 
 
 def nearest_pole(A: Floats, pole: complex) -> complex:

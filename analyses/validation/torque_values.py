@@ -1,17 +1,16 @@
 """Friction, breakaway, play and inertia of a drive's mechanics, each confronted by one tick.
 
-The mechanics stand alone: an ideal source of torque in place of motor and controllers, so that nothing but
-them is read.  A drive that starts in the predicted steady state keeps its speeds over a tick, or shows by
-their change what torque is missing: ``T = T_predicted - J (w_1 - w_0)/Ts``.  Thresholds (breakaway, contact)
-are bisected between two starts.
+An ideal source of torque stands in place of motor and controllers. From the predicted steady state speeds
+stay over a tick, or show what is missing: ``T = T_predicted - J (w_1 - w_0)/Ts``. Thresholds are bisected.
 """
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
-from itertools import pairwise
+from dataclasses import replace
+from itertools import pairwise, product
 from math import copysign, isfinite, tanh
 
 import numpy as np
+from scipy.optimize import bisect
 
 from actuator_lti.design.model import Command, Controller, Design, Instruments, Limits, Motor
 from actuator_lti.design.plant import reachable_speed
@@ -31,7 +30,10 @@ FAR = 4.0  # times a threshold: where it is looked for then
 
 def torque_rows(design: Design, model: Design) -> Iterator[Row]:
     yield from _inertias(design, model)
-    yield from _steady(design, model)
+    rows = Rows.of(mechanics(design))
+    for direction, load in product((1, -1), loads_of(design)):
+        for speed in speeds_of(design, direction):
+            yield from _at_speed(rows, design, model, direction * speed, load)
     if design.friction.law == "coulomb":
         yield from _breakaways(design, model)
     if design.coupling is not None and model.coupling is not None:
@@ -56,12 +58,7 @@ def edge(passed: Callable[[float], bool], predicted: float, beside: float, far: 
         near, out = 2.0 * predicted - far, far
         if passed(near) or not passed(out):
             return None
-    while abs(out - near) > 1e-12 * max(abs(near), abs(out)):
-        middle = 0.5 * (near + out)
-        if middle in (near, out):
-            break
-        near, out = (near, middle) if passed(middle) else (middle, out)
-    return 0.5 * (near + out)
+    return float(bisect(lambda x: passed(x) - 0.5, near, out, xtol=1e-13 * max(abs(near), abs(out))))
 
 
 def loads_of(design: Design) -> tuple[float, ...]:
@@ -106,17 +103,8 @@ def speeds_of(design: Design, direction: int) -> list[float]:
     return [fast, SLOW * fast, *bent]
 
 
-@dataclass(frozen=True)
-class _Balance:
-    """The predicted steady state at a speed under a load: torque at the motor, and what takes part in it."""
-
-    torque_Nm: float
-    motion: OperatingMotion
-    largest_Nm: float
-
-
-def _predicted(model: Design, speed_rad_s: float, load_Nm: float) -> _Balance:
-    """The steady state that ``model`` predicts, output at zero."""
+def _predicted(model: Design, speed_rad_s: float, load_Nm: float) -> tuple[float, float, OperatingMotion]:
+    """Torque, the largest that takes part, motion: the steady state of ``model``, the output at zero."""
     moment = load_Nm + float(model.load.moment_Nm(0.0))
     motion = operating_motion_at(mechanics(model), speed_rad_s, moment)
     torque, friction = motion.voltage_V, model.friction
@@ -127,26 +115,17 @@ def _predicted(model: Design, speed_rad_s: float, load_Nm: float) -> _Balance:
         torque -= sense * (1.0 - smooth) * float(dry_torque(model, moment - damped, sense))
     parts = (torque, moment / model.total_ratio, damped / model.total_ratio, friction.offset_torque_Nm,
              motion.coupling_Nm / model.ratio_to_coupling)  # fmt: skip
-    return _Balance(torque, motion, max(map(abs, parts)))
-
-
-def _steady(design: Design, model: Design) -> Iterator[Row]:
-    """Torques that a constant speed takes: at the motor, and behind a coupling what its twist gives."""
-    rows = Rows.of(mechanics(design))
-    for direction in (1, -1):
-        for load in loads_of(design):
-            for speed in speeds_of(design, direction):
-                yield from _at_speed(rows, design, model, direction * speed, load)
+    return torque, max(map(abs, parts)), motion
 
 
 def _at_speed(rows: Rows, design: Design, model: Design, speed: float, load: float) -> Iterator[Row]:
-    """One tick from the predicted steady state."""
-    wanted = _predicted(model, speed, load)
-    motion, Ts, N_c = wanted.motion, design.controller.period_s, design.ratio_to_coupling
+    """Torques that a constant speed takes, at motor and coupling, by one tick from the steady state."""
+    torque, largest, motion = _predicted(model, speed, load)
+    Ts, N_c = design.controller.period_s, design.ratio_to_coupling
     elastic = design.coupling is not None
     rows["load"], rows["speed_start"], rows["load_speed_start"] = load, speed, speed / N_c
     rows["twist_start"], rows["angle_start"] = motion.twist_rad, N_c * motion.twist_rad
-    drive = rows.running().begin(wanted.torque_Nm)
+    drive = rows.running().begin(torque)
     unit = design.load_unit
     condition = f"at {speed:.4g} {'m/s' if unit == 'N' else 'rad/s'} under {load:g} {unit}"
     J = design.motor_side_inertia_kgm2 if elastic else design.inertia_kgm2
@@ -158,15 +137,15 @@ def _at_speed(rows: Rows, design: Design, model: Design, speed: float, load: flo
         behind = coupling.stiffness_at(motion.twist_rad) * stretch + coupling.damping_Nms_rad * ulp
         behind = ULPS * (behind + design.load_side_inertia_kgm2 * ulp / Ts)
         floor += behind / N_c
-    found = wanted.torque_Nm - J * (drive.value("SPEED") - speed) / Ts
-    allowed = WITHIN * abs(wanted.torque_Nm) + EXACT * wanted.largest_Nm + floor
+    found = torque - J * (drive.value("SPEED") - speed) / Ts
+    allowed = WITHIN * abs(torque) + EXACT * largest + floor
     words = f"rounding of the speed is worth {floor:.1e} {unit}"
-    yield judged("steady_torque", "drive", wanted.torque_Nm, found, allowed, unit=unit, because=words,
+    yield judged("steady_torque", "drive", torque, found, allowed, unit=unit, because=words,
                  condition=condition)  # fmt: skip
     if not elastic:
         return
     slowed = design.load_side_inertia_kgm2 * (drive.value("LOAD_SPEED") - speed / N_c) / Ts
-    allowed = WITHIN * abs(motion.coupling_Nm) + EXACT * N_c * wanted.largest_Nm + behind
+    allowed = WITHIN * abs(motion.coupling_Nm) + EXACT * N_c * largest + behind
     yield judged("coupling_torque", "drive", motion.coupling_Nm, motion.coupling_Nm - slowed, allowed,
                  unit=unit, because=words, condition=condition)  # fmt: skip
 

@@ -14,11 +14,12 @@ from actuator_lti.drive.profile import command_mean
 from actuator_lti.errors import InputError, NumericalError, TooManyTicks
 from actuator_lti.loops import assemble_loops
 from actuator_lti.loops.assemble import loops_at
+from actuator_lti.loops.limiters import onset
 from actuator_lti.types import Progress
 from analyses.friction_effects import friction_effects
 from analyses.isolation import attempt
 from analyses.large_signal.conditional import conditional_stability
-from analyses.large_signal.from_rest import RestSweep, free_amplitude, margins_by_amplitude, sweep_from_rest
+from analyses.large_signal.from_rest import RestSweep, margins_by_amplitude, sweep_from_rest
 from analyses.large_signal.result import large_signals
 from analyses.large_signal.tones import settling_ticks_of
 from analyses.limit_cycles.counts import counts_of
@@ -169,12 +170,10 @@ class _Work:
                 made = [row for row in made if row.name == "delay_margin" or row.verdict is Verdict.NOT_MET]
             rows += [_unproven(name, self.notes)] if made is None else made
             self._step()
-        onsets = self._part("checks at onsets", self._onsets, None)
+        every = (small_signal(place) for place in self.bench.onsets())
+        onsets = self._part("checks at onsets", lambda: [row for rows in every for row in rows], None)
         rows += [_unproven("onsets", self.notes)] if onsets is None else onsets
         return rows, places
-
-    def _onsets(self) -> list[Row]:
-        return [row for place in self.bench.onsets() for row in small_signal(place)]
 
     def _held_by_friction(self) -> tuple[str, ...]:
         """Loops that are not stable as they are tested, but are with the friction that is left out there."""
@@ -212,8 +211,9 @@ class _Work:
         asked = np.geomspace(min(marks, default=high) / BELOW, high, self.settings.rest_frequencies)
         near = np.outer(marks, NEAR).ravel()
         asked = np.sort(np.concatenate([asked, near[near < top]]))
-        amplitude = free_amplitude(design, self._whole, asked, min(design.validation.amplitude_fractions))
-        return sweep_from_rest(design, asked, amplitude, self._settle())
+        part = min(design.validation.amplitude_fractions) * design.validation.full_deflection_rad
+        limited = onset(self._whole, 2.0 * np.pi * asked).amplitude_rad
+        return sweep_from_rest(design, asked, np.minimum(part, 0.5 * limited), self._settle())
 
 
 def _unproven(name: str, notes: list[str]) -> Row:

@@ -16,11 +16,8 @@ RULE_LENGTH = 3000  # of rules; longer ones cost a browser dear where they are d
 
 def panel_svg(panel: Panel, frame: Frame, pen: Pen, *, hide_x: bool) -> str:
     room = Room((frame.left + 2, frame.top + 2, frame.right - 2, frame.bottom - 2))
-    world, marks = [], []
-    for k, item in enumerate(panel.items):
-        drawn, dots = _item(item, panel, frame, pen.within(k), room)
-        world.append(drawn)
-        marks.append(dots)
+    drawn = [_item(item, panel, frame, pen.within(k), room) for k, item in enumerate(panel.items)]
+    world, marks = ("".join(parts) for parts in zip(("", ""), *drawn, strict=True))
     clip = f"{pen.prefix}c"
     wordy = [item for item in panel.items if isinstance(item, Rule | Note) and item.words]
     wordy.sort(key=lambda item: not (isinstance(item, Note) and item.pinned))  # which cannot give way
@@ -28,7 +25,7 @@ def panel_svg(panel: Panel, frame: Frame, pen: Pen, *, hide_x: bool) -> str:
     inside = (
         f'<clipPath id="{clip}"><rect x="{frame.left:.1f}" y="{frame.top:.1f}" width="{frame.width:.1f}" '
         f'height="{frame.height:.1f}"/></clipPath><g clip-path="url(#{clip})">'
-        f'<g class="world">{"".join(world)}</g><g class="marks">{"".join(marks)}</g></g>'
+        f'<g class="world">{world}</g><g class="marks">{marks}</g></g>'
     )
     axes = _axes(panel, frame, pen, hide_x=hide_x)
     known = _data(panel, frame, hide_x) if pen.page else ""
@@ -101,11 +98,9 @@ def _item(item: Item, panel: Panel, frame: Frame, pen: Pen, room: Room) -> tuple
         return pen.filled("".join(_path(x, y) + "z" for x, y in rings), item.look, key), ""
     if item.across == "x":
         a, b = frame.x(panel.x, [item.low, item.high])
-        path = f"M{a:.2f} -{FAR:.0f}V{FAR:.0f}H{b:.2f}V-{FAR:.0f}z"
-    else:
-        a, b = frame.y(panel.y, [item.low, item.high])
-        path = f"M-{FAR:.0f} {a:.2f}H{FAR:.0f}V{b:.2f}H-{FAR:.0f}z"
-    return pen.filled(path, item.look, key), ""
+        return pen.filled(f"M{a:.2f} -{FAR:.0f}V{FAR:.0f}H{b:.2f}V-{FAR:.0f}z", item.look, key), ""
+    a, b = frame.y(panel.y, [item.low, item.high])
+    return pen.filled(f"M-{FAR:.0f} {a:.2f}H{FAR:.0f}V{b:.2f}H-{FAR:.0f}z", item.look, key), ""
 
 
 def _curve(item: Curve, panel: Panel, frame: Frame, pen: Pen, room: Room, key: str) -> tuple[str, str]:
@@ -174,8 +169,7 @@ def note_svg(item: Rule | Note, panel: Panel, frame: Frame, pen: Pen, room: Room
     if isinstance(item, Rule):
         return _rule_words(item, panel, frame, pen, room, size)
     if item.at is None:
-        box = room.corner(item.corner or "top left", size)
-        return _boxed(item, box, pen, "")
+        return _boxed(item, room.corner(item.corner or "top left", size), pen, "")
     (x,), (y,) = frame.x(panel.x, [item.at[0]]), frame.y(panel.y, [item.at[1]])
     x, y = float(np.clip(x, frame.left, frame.right)), float(np.clip(y, frame.top, frame.bottom))
     tied = f' data-at="{x:.2f} {y:.2f}"' if pen.page else ""

@@ -90,22 +90,19 @@ class Pen:
         return f'<path{more} d="{path}" {stroke}/>'
 
     def filled(self, path: str, look: Look, more: str = "") -> str:
-        fill = look.fill or look.colour
-        opacity = "" if look.opacity == 1.0 else f"{look.opacity:g}"
-        edge = (
-            {"stroke": look.colour, "stroke_width": f"{look.width:g}"} if look.width else {"stroke": "none"}
-        )
+        fill, opacity = look.fill or look.colour, "" if look.opacity == 1.0 else f"{look.opacity:g}"
+        edge = {"stroke": look.colour if look.width else "none"}
+        edge |= {"stroke_width": f"{look.width:g}"} if look.width else {}
         body = f'<path{more} d="{path}" {self.style(fill=fill, fill_opacity=opacity, **edge)}/>'
         if not look.hatch:
             return body
-        name = f"{self.prefix}h"
         over = "paper" if fill != "none" else look.colour
         lines = self.style(stroke=over, stroke_width="1", fill="none")
-        pattern = (
-            f'<pattern id="{name}" width="6" height="6" patternUnits="userSpaceOnUse">'
+        return (
+            f'{body}<pattern id="{self.prefix}h" width="6" height="6" patternUnits="userSpaceOnUse">'
             f'<path d="{HATCH_PATHS[look.hatch]}" {lines}/></pattern>'
+            f'<path{more} d="{path}" fill="url(#{self.prefix}h)"/>'
         )
-        return f'{body}{pattern}<path{more} d="{path}" fill="url(#{name})"/>'
 
     def marker(self, look: Look, x: float, y: float) -> str:
         place = f"translate({x:.2f} {y:.2f}) scale({look.size / 2:g})"

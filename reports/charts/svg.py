@@ -182,8 +182,7 @@ def _legend(chart: Chart, prefix: str) -> str:
 
 
 def _key_rows(chart: Chart) -> list[list[tuple[str, Item, float]]]:
-    rows: list[list[tuple[str, Item, float]]] = []
-    x = math.inf
+    rows, x = list[list[tuple[str, Item, float]]](), math.inf
     for label, item in _shown(chart):
         size = SWATCH + 6.0 + text_width(label, TICK) + KEY_GAP
         if x + size > chart.width:

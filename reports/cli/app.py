@@ -33,7 +33,16 @@ def build() -> typer.Typer:
     app.callback()(about)
     for panel, commands in PANELS.items():
         for command in commands:
-            _register(app, command, panel)
+            own = [one for one in ANALYSES if one.name.split()[0] == command]
+            made = _APART.get(panel, {}).get(command)
+            if command in COMMANDS_IN:
+                made = typer.Typer(help=COMMANDS_IN[command], no_args_is_help=True)
+                for one in own:
+                    _add(made, one.name.split()[1], declared(one))
+            if isinstance(made, typer.Typer):
+                app.add_typer(made, name=command, rich_help_panel=panel)
+            else:
+                _add(app, command, made or declared(own[0]), panel)
     return app
 
 
@@ -80,25 +89,9 @@ def options_by_name() -> dict[str, str]:
     for command in todo:
         todo.extend(getattr(command, "commands", {}).values())
         for parameter in command.params:
-            option = next((word for word in parameter.opts if word.startswith("--")), None)
-            if option is not None:
-                result[parameter.name] = option
-                result[option[2:].replace("-", "_")] = option
+            for option in [word for word in parameter.opts if word.startswith("--")][:1]:
+                result |= {parameter.name: option, option[2:].replace("-", "_"): option}
     return result
-
-
-def _register(app: typer.Typer, command: str, panel: str) -> None:
-    """Add a command: declared, or apart as a function or a typer application; or all declared below it."""
-    own = [one for one in ANALYSES if one.name.split()[0] == command]
-    made = _APART.get(panel, {}).get(command)
-    if command in COMMANDS_IN:
-        made = typer.Typer(help=COMMANDS_IN[command], no_args_is_help=True)
-        for one in own:
-            _add(made, one.name.split()[1], declared(one))
-    if isinstance(made, typer.Typer):
-        app.add_typer(made, name=command, rich_help_panel=panel)
-    else:
-        _add(app, command, made or declared(own[0]), panel)
 
 
 def _add(app: typer.Typer, name: str, function: Callable[..., Any], panel: str | None = None) -> None:

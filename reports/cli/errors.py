@@ -78,12 +78,12 @@ def _run(call: Callable[[], object], options: Callable[[], Mapping[str, str]]) -
     except BrokenPipeError:
         return _quiet_pipe()
     except SystemExit as leaving:
-        if sys.stdout is output:
-            return leaving.code if isinstance(leaving.code, int) else DONE
-        sys.stdout = output  # typer met the closed pipe first and put a wrapper there
-        return _quiet_pipe()
+        if sys.stdout is not output:  # typer met the closed pipe first and put a wrapper there
+            sys.stdout = output
+            return _quiet_pipe()
+        return leaving.code if isinstance(leaving.code, int) else DONE
     except (KeyboardInterrupt, typer.Abort):
-        return _say("interrupted", INTERRUPTED)
+        status = INTERRUPTED
     except _USAGE_ERRORS as error:
         return _say(_usage_line(error), BAD_INPUT)
     except OSError as error:
@@ -101,8 +101,7 @@ def _by_option(error: InputError, known: Callable[[], Mapping[str, str]]) -> str
     name, equals, rest = str(error).partition(" = ")
     if error.where is not None or not equals or not name.isidentifier():
         return str(error)
-    options = known()
-    short = name.removesuffix("_Nm").removesuffix("_s").removesuffix("_rad")
+    options, short = known(), name.removesuffix("_Nm").removesuffix("_s").removesuffix("_rad")
     option = options.get(name) or options.get(short)
     return f"{option} {rest}" if option else str(error)
 
@@ -115,8 +114,7 @@ def _say(line: str, status: int) -> int:
 
 
 def _usage_line(error: BaseException) -> str:
-    context = getattr(error, "ctx", None)
-    command = context.command_path if context is not None else "actuator-lti"
+    command = getattr(getattr(error, "ctx", None), "command_path", "actuator-lti")
     message = error.format_message() if hasattr(error, "format_message") else str(error)
     for said, plain in _PLAIN.items():
         message = message.replace(f"Input should be a {said}", f"allowed: {plain}")

@@ -64,9 +64,9 @@ def export(
     notes += [f"no place for it in {into}: {label}" for label in homeless]
     notes += ["XML has no place for that factor: import it with --velocity-gain-per rpm"] * unsaid
     if as_json:
-        objects = [_plain(item) for item in result.objects.values]
-        made = {"schema": "actuator-lti/objects", "version": 1, "objects": objects, "notes": notes}
-        print_json({**made, "velocity_gain_factor": result.objects.velocity_gain_factor})
+        told = {"objects": list(map(_plain, result.objects.values)), "notes": notes}
+        told["velocity_gain_factor"] = result.objects.velocity_gain_factor
+        print_json({"schema": "actuator-lti/objects", "version": 1, **told})
         return
     if out is None:
         print_line(text.rstrip())
@@ -107,13 +107,12 @@ def import_settings(
     write_new(out, text, force)
     if as_json:
         changed = {path: result.design.parameters[path].text for path in result.changed}
-        print_json({"schema": "actuator-lti/objects-import", "version": 1, "changed": changed,
-                    "kept": [_plain(item) for item in result.kept], "notes": list(result.notes)})  # fmt: skip
+        told = {"changed": changed, "kept": list(map(_plain, result.kept)), "notes": list(result.notes)}
+        print_json({"schema": "actuator-lti/objects-import", "version": 1, **told})
         return
     if out is None:
         print_line(text.rstrip())
-    for path in result.changed:
-        known = result.design.parameters[path]
+    for path, known in ((path, result.design.parameters[path]) for path in result.changed):
         print_note(f"{path} = {known.text}" + f"  ({known.source})" * bool(known.source))
     for line in [*(f"kept: {item.label} = {item.value}" for item in result.kept), *result.notes]:
         print_note(line)

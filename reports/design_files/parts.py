@@ -33,10 +33,7 @@ def parts() -> Tree:
 
 
 def part(kind: str, name: str) -> Tree:
-    """A motor or a gear.
-
-    An InputError has the nearest name and all that there are.
-    """
+    """A motor or a gear; an InputError has the nearest name and all that there are."""
     known = parts()[kind]
     if name not in known:
         plain = "-".join(name.lower().split())

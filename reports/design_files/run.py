@@ -96,15 +96,15 @@ class Keys:
 
 
 def keys(asked: AskedKeys) -> Keys:
-    """The keys whose name or meaning holds a text, or that a data sheet or a controller calls so.
-
-    An InputError if none does, or the design that is to be explained is refused.
-    """
+    """The keys whose name or meaning holds a text, or that a sheet calls so; an InputError if none does."""
     text = asked.match.lower()
     if asked.explain is not None:
         design = load_design(asked.explain)
         figures = tuple(one for one in sheet_figures(design) if text in one.name.lower())
-        rows = (*explained(design), *_assumed(design))
+        rows = explained(design)
+        if "load.path" not in design.written:  # an engineer has to say it
+            path = f"{design.load.path}, assumed"
+            rows += (Explained("load.path", "not written", path, "a load only adds friction"),)
         warnings = tuple(Warned(line) for line in warnings_of(design) if text in line.lower())
         return Keys(tuple(item for item in rows if text in item.path), design, figures, warnings)
     axis: Axis = "linear" if asked.linear else "rotary"
@@ -127,14 +127,6 @@ def _limited(text: str, axis: Axis) -> Iterator[KeyEntry]:
             yield replace(key, unit=of.unit_for(axis), allowed=f'"{name}"', description=words)
 
 
-def _assumed(design: Design) -> tuple[Explained, ...]:
-    """The path of the load where its file does not say it: an engineer has to."""
-    if "load.path" in design.written:
-        return ()
-    path = design.load.path
-    return (Explained("load.path", "not written", f"{path}, assumed", "a load only adds friction"),)
-
-
 def _is_called(key: KeyEntry, text: str) -> bool:
     """Whether a text stands in a key's name or meaning, or is the word of a data sheet for it."""
     stands = text in key.path.lower() or text in key.description.lower()
@@ -150,10 +142,7 @@ class Started:
 
 
 def init(asked: AskedStart) -> Started:
-    """Write a commented design file, named as the file is.
-
-    An InputError if there is such a file already, or the source is no design.
-    """
+    """Write a commented design file, named as the file is, where there is none already."""
     refuse_existing(asked.file, asked.force)
     source = KINDS[asked.kind] if asked.kind else asked.source
     starter = Path(__file__).parents[1] / "templates" / "design.toml"

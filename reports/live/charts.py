@@ -1,5 +1,8 @@
 """The empty figures of the live page: axes and curves that the page's script fills."""
 
+from collections.abc import Callable
+from functools import partial
+
 from actuator_lti.design.model import Axis
 from actuator_lti.drive.signals import LIMITERS, SIGNALS
 from nonlinear.export.page import line_of
@@ -20,12 +23,18 @@ BORDERS = {one.words: COLOURS[name] for name, one in LIMITERS.items() if line_of
 def live_charts(unit: str, axis: Axis = "rotary", *, electrical: bool = True) -> dict[str, str]:
     """Give each figure's SVG by its name; ``unit`` is that of the command, ``electrical``: with a current."""
     both = "as designed and as changed"
+    bode = _over_frequency(
+        370.0, (1.15, 1.0), partial(_both, measured=True), (-60.0, 40.0, 0.0), (-360.0, 0.0, -180.0)
+    )
+    measured: style.Style = {"colour": style.ORANGE, "width": 1.6}
+    apart = partial(Panel.curve, x=(), y=(), label="measured over model", **measured)
+    difference = _over_frequency(250.0, (1.0, 1.0), apart, *2 * [(-10.0, 10.0, 0.0)])
     drawn = {
-        "bode": (_bode(), f"Open loop: magnitude and phase, {both}."),
+        "bode": (bode, f"Open loop: magnitude and phase, {both}."),
         "nyquist": (_nyquist(), f"Nyquist curve near -1, {both}."),
         "sensitivity": (_sensitivity(), f"Sensitivity S and closed loop T, {both}."),
         "step": (_step(), f"Step response of the linear loop, {both}."),
-        "difference": (_difference(), "Measured frequency response over the model as changed."),
+        "difference": (difference, "Measured frequency response over the model as changed."),
         "run": (_run(unit, axis, electrical), f"Run with limits and friction, {both}, and a record."),
         "border": (_border(unit), f"Command amplitude at which a limit is reached, {both}."),
     }
@@ -42,17 +51,20 @@ def _both(panel: Panel, *, pinned: bool = True, measured: bool = False) -> None:
     panel.curve(*EMPTY, "as changed", **NOW)
 
 
-def _bode() -> Chart:
-    chart, (top, bottom) = style.stack(370.0, 1.15, 1.0, **FOLLOWED)
-    for panel, label, low, high, level in (
-        (top, "magnitude, dB", -60.0, 40.0, 0.0),
-        (bottom, "phase, deg", -360.0, 0.0, -180.0),
-    ):
-        _both(panel, measured=True)
+def _over_frequency(
+    height: float,
+    heights: tuple[float, float],
+    draw: Callable[[Panel], object],
+    *limits: tuple[float, float, float],
+) -> Chart:
+    """Magnitude over phase, each with its ends and the level that a line marks."""
+    chart, panels = style.stack(height, *heights, **FOLLOWED)
+    for panel, label, (low, high, level) in zip(panels, ("magnitude, dB", "phase, deg"), limits, strict=True):
+        draw(panel)
         panel.y.label = label
         panel.y.limits(low, high)
         panel.rule_y(level, colour=style.INK)
-    style.frequency(bottom, HERTZ)
+    style.frequency(panels[-1], HERTZ)
     return chart
 
 
@@ -73,17 +85,6 @@ def _sensitivity() -> Chart:
         panel.curve(*EMPTY, f"{name} as changed", colour=colour, width=2.0)
     style.frequency(panel, HERTZ)
     panel.y.limits(-40.0, 15.0)
-    return chart
-
-
-def _difference() -> Chart:
-    chart, (top, bottom) = style.stack(250.0, 1.0, 1.0, **FOLLOWED)
-    for panel, label in ((top, "magnitude, dB"), (bottom, "phase, deg")):
-        panel.curve(*EMPTY, "measured over model", colour=style.ORANGE, width=1.6)
-        panel.rule_y(0.0, colour=style.INK)
-        panel.y.label = label
-        panel.y.limits(-10.0, 10.0)
-    style.frequency(bottom, HERTZ)
     return chart
 
 

@@ -94,10 +94,9 @@ def _top(design: Design, path: str) -> float:
 def named(design: Design, path: str) -> Tree:
     """Give path, value and unit as the design file writes them."""
     field, value = located(design, path)[0], parameter_value(design, path)
-    shown, factor = unit_as_stated(design, path)
-    shown, whole = "" if shown == "1" else shown, field.kind == "integer"
-    about = {"path": path, "about": field.description, "value": value}
-    return {**about, "unit": shown, "factor": factor, "whole": whole}
+    unit, factor = unit_as_stated(design, path)
+    about = {"path": path, "about": field.description, "value": value, "unit": "" if unit == "1" else unit}
+    return {**about, "factor": factor, "whole": field.kind == "integer"}
 
 
 def _slider(design: Design, path: str) -> Tree:

@@ -124,11 +124,10 @@ def _judged(
     apart: list[Tree] = []
     for item in design.requirements:
         words, load = QUANTITIES[item.quantity].words, item.load_Nm or 0.0
-        if item.quantity not in LOOP_QUANTITIES:
-            if (lines := figures.get((item.quantity, load))) is None:
-                apart.append({"id": item.id, "words": words})
-            else:
-                followed.append({**_limit(item), "load": load, "lines": lines})
+        if (lines := figures.get((item.quantity, load))) is not None:
+            followed.append({**_limit(item), "load": load, "lines": lines})
+        elif item.quantity not in LOOP_QUANTITIES:
+            apart.append({"id": item.id, "words": words})
         elif not in_populations(item, design):
             which = "rotor locked" if item.rotor == "locked" else f"to the {item.to or 'command'}"
             apart.append({"id": item.id, "words": f"{words}, {which}"})

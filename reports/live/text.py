@@ -41,12 +41,10 @@ def _own(design: Design, key: Tree, text: str) -> Patch | None:
     """The patch of a key in a text of the user; None where the changed text would not say the same."""
     path, known = key["path"], design.parameters.get(key["path"])
     place = _entry_of(path, text)
-    if place is None or known is None:
-        made = _added(path, text)
-    else:
-        begin, end = place
-        changed = _changed(text[begin:end], known.text)
-        made = None if changed is None else (begin, end, *changed)
+    made = _added(path, text)
+    if place is not None and known is not None:
+        changed = _changed(text[slice(*place)], known.text)
+        made = None if changed is None else (*place, *changed)
     if made is None:
         return None
     number = key["value"] / key["factor"]
@@ -91,8 +89,7 @@ def _changed(entry: str, was: str) -> tuple[str, str] | None:
 def _added(path: str, text: str) -> Patch | None:
     """An entry behind the header of its table, or with its whole path before all tables."""
     table, _, key = path.rpartition(".")
-    header = re.search(rf"^\[{re.escape(table)}\][^\n]*\n", text, re.MULTILINE)
-    if header is not None:
+    if header := re.search(rf"^\[{re.escape(table)}\][^\n]*\n", text, re.MULTILINE):
         return header.end(), header.end(), f"{key} = ", "\n"
     first = re.search(r"^\[", text, re.MULTILINE)
     place = first.start() if first else len(text)

@@ -175,8 +175,7 @@ class Between:
     def _columns_of(self, old: Result, new: Result) -> Columns:
         """The figures of two results, each as the new one declares it where both have it."""
         before, after = (self.history.numbers(result)[0] for result in (old, new))
-        key = (id(before), id(after))  # the history keeps them
-        if key not in self._columns:
+        if (key := (id(before), id(after))) not in self._columns:  # the history keeps them
             known = {figure.name: figure for figure in (*before, *after)}
             self._columns[key] = Columns(list(known.values()), self.tolerances)
         return self._columns[key]
@@ -230,13 +229,12 @@ def headlines(designs: Sequence[DesignView]) -> tuple[Headline, ...]:
 
 
 def cause_words(cause: Cause) -> str:
-    values = [f"{name} {_step(old, new)}" for name, old, new in (*cause.parameters, *cause.settings)]
-    if values:
-        more = len(values) - 2
-        return one_line("; ".join(values[:2]) + (f"; {more} more values" if more > 0 else ""), 200)
+    if values := [f"{name} {_step(old, new)}" for name, old, new in (*cause.parameters, *cause.settings)]:
+        more = f"; {len(values) - 2} more values" * (len(values) > 2)
+        return one_line("; ".join(values[:2]) + more, 200)
     if cause.commits:
-        more = len(cause.commits) - 1
-        return one_line(f"commit {cause.commits[0][1]}", 120) + (f" and {more} more" if more else "")
+        more = f" and {len(cause.commits) - 1} more" * (len(cause.commits) > 1)
+        return one_line(f"commit {cause.commits[0][1]}", 120) + more
     if cause.libraries:
         return one_line("; ".join(f"{name} {old} → {new}" for name, old, new in cause.libraries), 200)
     return CODE_CHANGED if cause.code else "no input differs"

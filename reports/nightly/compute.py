@@ -39,12 +39,9 @@ def build(payload: Mapping[str, Any]) -> tuple[Tree, dict[str, bytes]]:
     settings, comparison = payload.get("settings", {}), "study" in payload
     made = _comparison(payload) if comparison else _report(_design(payload), settings)
     plain = doc.loads(doc.dumps(made))
-    files = {
-        "report.html": page(plain, beside="report.json").encode(),
-        "report.json": doc.dumps(plain).encode(),
-    }
-    if settings.get("pdf"):
-        files["report.pdf"] = pdf_bytes(plain)
+    html, data = page(plain, beside="report.json").encode(), doc.dumps(plain).encode()
+    files = {"report.html": html, "report.json": data}
+    files |= {"report.pdf": pdf_bytes(plain)} if settings.get("pdf") else {}
     meta = digest({**plain, "sections": []} if comparison else plain)
     lacking = [one.part for one in drain() if one.part.startswith("figure ")]  # sections say so themselves
     meta["failed_sections"] = [*meta["failed_sections"], *(f"{part}, not drawn" for part in lacking)]

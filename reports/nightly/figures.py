@@ -90,10 +90,9 @@ def figures_of(document: Mapping[str, Any]) -> Iterator[Figure]:
         name, unit = verdict["id"], verdict["unit"]
         kind = "requirement" if verdict["what"] == REQUIREMENTS else "check"
         met = {"met": 1.0, "not met": 0.0}.get(verdict["verdict"])
-        left = verdict["distance"]
-        yield Figure(name=f"{name}: value", value=verdict["value"], unit=unit, kind=kind)
-        yield Figure(name=f"{name}: distance", value=left, unit=unit, better=1, kind="distance")
-        yield Figure(name=f"{name}: met", value=met, kind="verdict")
+        yield Figure(f"{name}: value", verdict["value"], unit, kind=kind)
+        yield Figure(f"{name}: distance", verdict["distance"], unit, better=1, kind="distance")
+        yield Figure(f"{name}: met", met, kind="verdict")
     first: dict[str, Figure] = {}
     for section, block in _blocks(document):
         for figure in () if section in _INPUT_SECTIONS else _of_block(section, block):
@@ -125,8 +124,7 @@ def _of_table(section: str, block: Mapping[str, Any]) -> Iterator[Figure]:
     for row in rows:
         label = " / ".join(one_line(row[k], 60) for k in names if isinstance(row.get(k), str) and row[k])
         counts[label] += 1
-        if counts[label] > 1:
-            label = f"{label} ({counts[label]})"
+        label += f" ({counts[label]})" * (counts[label] > 1)
         for column, heading in zip(numeric, _headings(numeric), strict=True):
             value, shown = row.get(column["key"]), column
             name = f"{section} / {caption} / {label} / {one_line(heading, 40)}"

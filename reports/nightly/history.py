@@ -49,8 +49,7 @@ class History:
     """Reader and writer of the history in a state folder; see `open_history`."""
 
     def __init__(self, state: Path, index: Index) -> None:
-        self.state = state
-        self.index = index
+        self.state, self.index = state, index
         self._nights: dict[int, Night] = {}
 
     # ---- writing -----------------------------------------------------------------------------------
@@ -99,8 +98,8 @@ class History:
         if not known:
             self._put(replace(self.index, study=study))
         elif known != study:
-            told = f"holds the nights of study {known[:80]!r}, not of {study[:80]!r}: use another --site"
-            raise InputError(told)
+            of = f"{known[:80]!r}, not of {study[:80]!r}"
+            raise InputError(f"holds the nights of study {of}: use another --site")
 
     def _put(self, index: Index) -> None:
         checksum = sha256(_INDEX.dump_json(index))
@@ -121,8 +120,7 @@ class History:
     def night(self, run: int) -> Night:
         """The results of a finished night; a file that is missing, or not what was written, is refused."""
         if run not in self._nights:
-            wanted = next(one for one in self.runs if one.id == run)
-            path = self._path(run)
+            wanted, path = next(one for one in self.runs if one.id == run), self._path(run)
             data = _read(path)
             if sha256(data) != wanted.sha256:
                 raise _damaged(path, "is not what was written")

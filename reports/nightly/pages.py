@@ -62,24 +62,6 @@ def of_night(night: Overview, history: History, available: set[str]) -> Iterator
 def design_page(night: Overview, design: DesignView, history: History, available: set[str]) -> str:
     past = history.results(design.name)
     course = course_of(night, design, history, past)
-    return _render(
-        "nightly/design.html", bundled("figures"), night=night, design=design, charts=course.charts,
-        steady=course.steady, nights=_nights(night, design, past, course, available),
-        more_nights=max(0, len(past) - MAX_NIGHTS), max_changes=changes.SHOWN_CHANGES,
-    )  # fmt: skip
-
-
-def _render(template: str, code: str, **context: Any) -> str:
-    return render(
-        template, style=asset("nightly/nightly.css"), code=code, states=STATES, night_signs=NIGHT_SIGNS,
-        told=changes, visible=visible, one_line=one_line, **context,
-    )  # fmt: skip
-
-
-def _nights(
-    night: Overview, design: DesignView, past: list[Result], course: Course, available: set[str]
-) -> list[Tree]:
-    """Rows of the table of nights, the last first, with rows for nights that are missing (``gap``)."""
     known, states, rows = {r.run: r for r in past}, outcomes(past), list[Tree]()
     gaps = {night.runs[i].id: count for i, count in night.missing}
     for run in reversed(night.runs):
@@ -93,7 +75,18 @@ def _nights(
         row |= {"moved": course.moved.get(run.id, 0), "marks": course.marks.get(run.id, [])}
         approved = design.approval is not None and design.approval.run == run.id
         rows.append({**row, "report": folder if folder in available else "", "approved": approved})
-    return rows
+    return _render(
+        "nightly/design.html", bundled("figures"), night=night, design=design, charts=course.charts,
+        steady=course.steady, nights=rows,
+        more_nights=max(0, len(past) - MAX_NIGHTS), max_changes=changes.SHOWN_CHANGES,
+    )  # fmt: skip
+
+
+def _render(template: str, code: str, **context: Any) -> str:
+    return render(
+        template, style=asset("nightly/nightly.css"), code=code, states=STATES, night_signs=NIGHT_SIGNS,
+        told=changes, visible=visible, one_line=one_line, **context,
+    )  # fmt: skip
 
 
 # ---- one design over all its nights ---------------------------------------------------------------------
@@ -130,10 +123,10 @@ def course_of(night: Overview, design: DesignView, history: History, past: Seque
     for k in sorted(range(len(figures)), key=lambda k: figures[k].kind != "requirement"):
         figure = figures[k]
         shown = figure.kind in ("requirement", "check") or (figure.better and figure.kind == "figure")
-        if figure.kind == "requirement" and not np.isfinite(values[:, k]).any():
-            course.steady.append(figure)  # of a loop that was never stable, say
-        elif shown and np.isfinite(values[:, k]).any():
+        if shown and np.isfinite(values[:, k]).any():
             _add(course, figure, verdicts.get(figure.name, {}), nights, values[:, k], allowed[k])
+        elif figure.kind == "requirement":
+            course.steady.append(figure)  # of a loop that was never stable, say
     return course
 
 
@@ -184,7 +177,7 @@ def line_chart(
     up[1::2][np.isnan(values[corners[1:]])] = np.nan  # no step into a gap
     panel.curve(np.repeat(days[corners], 2)[1:], up, colour=style.BLUE, width=1.8)
     finite = np.isfinite(values)
-    padded = np.concatenate([[False], finite, [False]])
+    padded = np.pad(finite, 1)
     alone = np.flatnonzero(finite & ~padded[:-2] & ~padded[2:])  # a line does not show them
     shown = [*alone.tolist(), int(np.flatnonzero(finite)[-1])]
     panel.points(days[shown], values[shown], colour=style.BLUE, size=4.0, read=False)

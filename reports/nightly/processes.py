@@ -91,10 +91,8 @@ class Warm:
     """Processes that go from task to task: one for each thread that asks."""
 
     def __init__(self, limits: Limits) -> None:
-        self._limits = limits
-        self._lock = Lock()
+        self._limits, self._lock, self._closed = limits, Lock(), False
         self._children: dict[int, _Child] = {}
-        self._closed = False
 
     def build(self, task: Task) -> Answer:
         """Build a task in the process of this thread, in a new one where that has ended."""

@@ -54,9 +54,8 @@ def mark(site: Path) -> None:
 
 
 def remove_leftovers(*folders: Path) -> None:
-    for folder in folders:
-        for leftover in folder.rglob(".*.part"):
-            leftover.unlink(missing_ok=True)
+    for leftover in (path for folder in folders for path in folder.rglob(".*.part")):
+        leftover.unlink(missing_ok=True)
 
 
 def publish(
@@ -98,13 +97,10 @@ def _lacking(site: Path, design: DesignView, cache: Cache) -> Iterator[tuple[Pat
     for part in (folder, folder.parent) if wanted else ():
         if part.is_symlink():
             raise InputError("is a symbolic link: a site holds its reports itself", where=str(part))
-    missing = []
-    for name, digest in wanted.items():
-        path = folder / name
+    for path in map(folder.joinpath, wanted):
         if os.path.lexists(path) and (path.is_symlink() or not path.is_file()):
             raise InputError("is no regular file: a site holds its reports itself", where=str(path))
-        if not _is_there(path, digest):
-            missing.append(name)
+    missing = [name for name, digest in wanted.items() if not _is_there(folder / name, digest)]
     entry = cache.whole(design.result.key) if missing else None
     for name in missing:
         if entry is None:

@@ -36,14 +36,12 @@ def state_of(site: Path, state: Path | None = None) -> Path:
         why = "lies inside the site and would be published with it: --state takes a folder elsewhere"
         raise InputError(why, shown_path(state))
     folders = (state, state / CACHE, state / NIGHTS)
-    for folder in folders:
-        if os.path.lexists(folder) and not folder.is_dir():
-            raise InputError("is no folder; allowed: a folder, or none yet", shown_path(folder))
+    for folder in (one for one in folders if os.path.lexists(one) and not one.is_dir()):
+        raise InputError("is no folder; allowed: a folder, or none yet", shown_path(folder))
     inside = [path for folder in folders if folder.is_dir() for path in folder.iterdir()]
-    for path in (state, *inside):
-        if path.is_symlink():
-            why = "is a symbolic link: history and cache are kept in the state folder itself"
-            raise InputError(why, shown_path(path))
+    for path in filter(Path.is_symlink, (state, *inside)):
+        why = "is a symbolic link: history and cache are kept in the state folder itself"
+        raise InputError(why, shown_path(path))
     return state
 
 

@@ -75,8 +75,8 @@ def believed(sections: Sequence[doc.Section]) -> str:
     words = [f"Linear equals simulated to {power_above(max(errors))}"] if errors and max(errors) > 0.0 else []
     words += [f"{count.met} of {count.total} checks by simulation met"]
     words += [f"{count.not_met} not met"] if count.not_met else []
-    open_ones = [item["label"] for item in checks if item["verdict"] == "not proven"]
-    words += [f"{len(open_ones)} not proven" if open_ones else "nothing unproven"]
+    open_ones = sum(item["verdict"] == "not proven" for item in checks)
+    words += [f"{open_ones} not proven" if open_ones else "nothing unproven"]
     return capital("; ".join(words)) + "."
 
 

@@ -49,13 +49,9 @@ def brief(comparison: Comparison) -> Brief:
     shown = compare_best.choice(comparison)
     kept = ("design", "met", "missed", "unproven")
     block = doc.with_columns(compare_best.designs(shown, note=""), kept)
-    names = [
-        name
-        for loop in LOOPS
-        for name in shown.names
-        if name.group == loop and name.key.removeprefix(f"{loop}.") in _TERMINAL
-        if any(_is_other(name, one, shown.base) for one in shown.variants)
-    ]
+    wanted = {f"{loop}.{quantity}" for loop in LOOPS for quantity in _TERMINAL}
+    moved = [n for n in shown.names if any(_is_other(n, one, shown.base) for one in shown.variants)]
+    names = [name for loop in LOOPS for name in moved if name.group == loop and name.key in wanted]
     loops = _of_figures("Loops", names, _OF_GROUP, shown, [shown.all], _MARKS) if names else []
     left_out = len(comparison.all) - len(shown.all)
     notes = [f"{left_out} more designs are in {compare_best.TABLE}"] if left_out else []

@@ -7,7 +7,6 @@ and figure, those with the most and the least room.
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
-from typing import cast
 
 from actuator_lti.asked.quantities import reserve
 from actuator_lti.asked.verdict import Verdict
@@ -42,8 +41,8 @@ def section(comparison: Comparison) -> doc.Section:
         "distance from -1 that the limit keeps."
     )
     missed = len(met) < len(everything.all) or bool(everything.refused)
-    blocks, status = [designs(comparison), _best(everything)], "fail" if missed else "pass"
-    return doc.section(id, title, blocks, result=words, intro=intro, status=cast(doc.Status, status))
+    blocks, status = [designs(comparison), _best(everything)], Verdict.of(not missed).role()
+    return doc.section(id, title, blocks, result=words, intro=intro, status=status)
 
 
 def failed(one: Compared) -> int:

@@ -140,9 +140,9 @@ def _tornado(
     panel.rule_x(base, colour=style.INK, width=1.3)
     if limit is not None and near:
         panel.rule_x(limit, "limit", seen=True, colour=style.RED, width=1.4, dash=1)
-    spans = {bar.path: (bar.low_value, bar.high_value) for bar in bars}
-    widths = {path: 100.0 * (b - a) / (abs(a + b) or math.inf) for path, (a, b) in spans.items()}
-    style.rows(panel, [f"{path} ±{width:.3g} %" for path, width in widths.items()])
+    spans = [(bar.path, bar.low_value, bar.high_value) for bar in bars]
+    widths = [(path, 100.0 * (b - a) / (abs(a + b) or math.inf)) for path, a, b in spans]
+    style.rows(panel, [f"{path} ±{width:.3g} %" for path, width in widths])
     return doc.figure("tornado", chart, f"{words}: each parameter alone at both its ends.")
 
 

@@ -19,7 +19,10 @@ def section(result: Corners) -> doc.Section:
         "The worst ends are those that one by one lower the margin of the loop where it is smallest, all "
         "taken together; the worst-case search of montecarlo looks inside the box as well."
     )
-    named = [doc.text(_described(corner)) for corner in result.corners[1:]]
+    named = [
+        doc.text(". ".join([f"{one.name.capitalize()}: {one.words}", *one.refused.values()]) + ".")
+        for one in result.corners[1:]
+    ]
     caption = "From nominal (line) to each corner (dot): which corner moves which margin, loop by loop."
     alt = f"{caption} The figures stand in the table of every loop at every corner."
     details = doc.details("Every loop at every corner", [_loop_table(result), *named])
@@ -49,10 +52,6 @@ def summary(result: Corners) -> str:
     where = f"all {count} corners" if len(failed) == count else where
     what = Counter(name for corner in result.corners for name in _failings(corner))
     return f"The drive fails at {where}: {', '.join(f'{name} at {n}' for name, n in what.items())}.{more}"
-
-
-def _described(corner: Corner) -> str:
-    return ". ".join([f"{corner.name.capitalize()}: {corner.words}", *corner.refused.values()]) + "."
 
 
 def _failings(corner: Corner) -> list[str]:

@@ -97,10 +97,9 @@ def _summary(whole: Correlation) -> doc.Section:
     listed = ("All records", rows, columns)
     table = doc.listing(*listed, status=lambda row: "info" if row[0].startswith("all ") else None)
     result, signal = worst_of(results)
-    figure = signal_figure(signal, f"The worst record, {result.record}. ")
+    parts = [table, signal_figure(signal, f"The worst record, {result.record}. ")]
     intro = f"{len(results)} records against {result.design}; the motion of {result.record} is furthest off."
     status: doc.Status = "pass" if whole.passed else "fail"
-    parts = [table, figure]
     return doc.section("correlation", "All records", parts, result=words(whole), intro=intro, status=status)
 
 
@@ -127,8 +126,7 @@ def comparison_table(result: CorrelationResult) -> doc.Block:
 def signal_figure(signal: SignalComparison, first: str = "") -> doc.Block:
     difference = signal.modelled - signal.measured
     rows = style.kept_rows([signal.measured, signal.modelled, difference])
-    name = _named(signal.name)
-    time = signal.time_s[rows]
+    name, time = _named(signal.name), signal.time_s[rows]
     chart, (upper, lower) = style.stack(380.0, 2.2, 1.0)
     upper.curve(time, signal.measured[rows], "measured", colour=style.BLUE)
     upper.curve(time, signal.modelled[rows], "model", colour=style.ORANGE, width=1.4, dash=1)

@@ -1,8 +1,6 @@
 """Duty cycle against the continuous rating: current, overload protection and winding temperature."""
 
 import math
-from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
 
@@ -74,17 +72,15 @@ def summary(result: Duty) -> str:
 
 def _found(result: Duty) -> str:
     """What is beyond its limit, else the current."""
-    beyond = [row for row in _rows(result) if row["_status"] == "fail"]
-    if beyond:
-        return "; ".join(map(_beyond, beyond))
+    if beyond := [row for row in _rows(result) if row["_status"] == "fail"]:
+        units = [f" {row['unit']}".rstrip() for row in beyond]
+        told = zip(beyond, units, strict=True)
+        return "; ".join(
+            f"{r['what']} {r['value']:.4g}{unit}, limit {r['limit']:.4g}{unit}" for r, unit in told
+        )
     known = math.isfinite(result.continuous_A)
     limit = f", limit {result.continuous_A:.4g} A" if known else ", and no continuous current is stated"
     return f"{result.rms_A:.4g} A, rms over time{limit}"
-
-
-def _beyond(row: Mapping[str, Any]) -> str:
-    unit = f" {row['unit']}".rstrip()
-    return f"{row['what']} {row['value']:.4g}{unit}, limit {row['limit']:.4g}{unit}"
 
 
 def _rows(result: Duty) -> list[doc.Row]:
@@ -106,8 +102,7 @@ def _rows(result: Duty) -> list[doc.Row]:
         ("power back to the supply, peak", result.fed_back_W, "W"),
     )
     rows += [_row(what, value, math.inf, unit) for what, value, unit in figures]
-    if over is not None:
-        rows.append(_row("overload state, peak", over.peak, 1.0, "", over.acts_after_s))
+    rows += [_row("overload state, peak", over.peak, 1.0, "", over.acts_after_s)] if over else []
     if heat is not None:
         rows.append(_row("winding temperature", heat.final_degC, heat.limit_degC, "°C", heat.limit_after_s))
     return rows
@@ -129,9 +124,9 @@ def _figure(result: Duty) -> doc.Block:
     if math.isfinite(result.continuous_A):
         panel.rule_y(result.continuous_A, "continuous", seen=True, colour=style.RED, dash=2)
     panel.x.limits(0.0, last * scale)
-    caption, periods = "Motor current over one period of the motion", len(result.time_s) // rows
-    caption += f", the largest of {periods}, which come nearest to whole turns of the load" * (periods > 1)
-    caption += "."
+    periods = len(result.time_s) // rows
+    most = f", the largest of {periods}, which come nearest to whole turns of the load" * (periods > 1)
+    caption = f"Motor current over one period of the motion{most}."
     if result.heating is not None:
         caption += " Right: the winding from ambient."
         panel, heat = chart.panel(y="winding, °C", title="Winding"), result.heating

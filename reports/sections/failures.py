@@ -39,18 +39,17 @@ def section(result: Failures) -> doc.Section:
         f"Deflection counts from where the output was; {_stop(result, out)}, and "
         f"detection takes {1e3 * asked.detection_s:.4g} ms. The {push} is that in the coupling"
     )
-    if result.design.coupling is None:
-        intro += (
-            ": of this rigid train what it passes to the output, to its inertia and load or, jammed, what "
-            "the motor presses with, less dry friction and gear losses, without an impact"
-        )
-    intro += "."
+    rigid = (
+        ": of this rigid train what it passes to the output, to its inertia and load or, jammed, what "
+        "the motor presses with, less dry friction and gear losses, without an impact"
+    )
+    intro += rigid * (result.design.coupling is None) + "."
     left = [f"{NAMES[name]}: not for this drive, as {why}." for name, why in result.left_out.items()]
     own = requirements.table(result.requirements, result.design.load_unit)
     blocks = [_table(result, out), *own, _figure(result, out), *map(doc.text, left)]
-    told_as: doc.Severity = "info" if verdict_of(result.design, swing) is Verdict.MET else "warn"
-    status = "info" if result.verdict is None else doc.severity(result.verdict)
-    told_as = told_as if status == "info" else status
+    status = told_as = "info" if result.verdict is None else doc.severity(result.verdict)
+    if status == "info" and verdict_of(result.design, swing) is not Verdict.MET:
+        told_as = "warn"
     words, title = summary(result), "Failure cases"
     return doc.section("failures", title, blocks, result=words, intro=intro, status=status, told=told_as)
 

@@ -59,11 +59,10 @@ def section(forms: Mapping[str, Mapping[str, LoopFigures]], refused: Sequence[st
 
 
 def _row(name: str, form: str, figures: LoopFigures, ideal: LoopFigures | None) -> doc.Row:
-    margins, response = margin_row(figures), response_row(figures)
-    reference = margin_row(ideal)["phase_margin_deg"] if ideal else None
-    own = margins["phase_margin_deg"]
+    known = margin_row(figures) | response_row(figures)
+    own, reference = known["phase_margin_deg"], margin_row(ideal)["phase_margin_deg"] if ideal else None
     cost = None if own is None or reference is None or form == "ideal" else own - reference
-    row = {**margins, **response, "loop": loop_words(name), "form": FORMS[form], "phase_cost_deg": cost}
+    row = {**known, "loop": loop_words(name), "form": FORMS[form], "phase_cost_deg": cost}
     return row | ({"_status": "fail"} if figures.sound is False else {})
 
 
@@ -177,13 +176,10 @@ def _spread(points: Sequence[OperatingPointFigures]) -> str:
         here = [p.place or p.label for p in points if any(f.sound is sound for f in p.figures.values())]
         if here:
             return f"{words} at {len(here)} of {len(points)} operating points: {'; '.join(here)}."
-    rows = [
-        (margin_row(f.judged), f"{n} loop, {p.place or p.label}")
-        for p in points
-        for n, f in p.figures.items()
-    ]
-    known = [(row["phase_margin_deg"], words) for row, words in rows if row["phase_margin_deg"] is not None]
-    deg, where = min(known, key=lambda each: float(each[0]), default=(None, ""))
+    each = [(f"{n} loop, {p.place or p.label}", f.judged) for p in points for n, f in p.figures.items()]
+    margins = [(margin_row(figures)["phase_margin_deg"], words) for words, figures in each]
+    known = [pair for pair in margins if pair[0] is not None]
+    deg, where = min(known, key=lambda pair: float(pair[0]), default=(None, ""))
     least = "" if deg is None else f"; the smallest phase margin is {deg:.1f} deg ({where})"
     return f"Stable at all {len(points)} operating points{least}."
 
@@ -193,10 +189,9 @@ def _operating_point(point: OperatingPointFigures, scale: float) -> doc.Row:
     row: doc.Row = {"point": point.label, "slope": point.slope_Nms_rad * scale, "load": load}
     for name, result in point.figures.items():
         one = result.judged
-        margins, response = margin_row(one), response_row(one)
-        row[f"{name}_phase"] = margins["phase_margin_deg"] if one.stable else one.margins.verdict
-        row[f"{name}_gain"] = margins["gain_margin_db"]
-        row[f"{name}_band"] = response["minus3db_hz"] or None
+        known = margin_row(one) | response_row(one)
+        row[f"{name}_phase"] = known["phase_margin_deg"] if one.stable else one.margins.verdict
+        row |= {f"{name}_gain": known["gain_margin_db"], f"{name}_band": known["minus3db_hz"] or None}
         row |= {"_status": "fail"} if result.sound is False else {}
     return row
 

@@ -173,8 +173,7 @@ def _settling_table(result: FrictionEffects, fine: Unit, load: str) -> doc.Block
 def _figure(result: FrictionEffects, fine: Unit, load: str) -> list[doc.Block]:
     points = [(f"load {point.load_Nm:g} {load}", point) for point in result.points]
     loops = [(label, one.hysteresis) for label, one in points if one.hysteresis is not None]
-    waits = [(label, one.threshold.waiting) for label, one in points if one.threshold]
-    waits = [(label, waiting) for label, waiting in waits if waiting]
+    waits = [(label, of.waiting) for label, one in points if (of := one.threshold) and of.waiting]
     if not loops:
         return []
     scale, small = fine

@@ -1,7 +1,9 @@
 """An identification of any kind: its section, and the design that it writes; a plan, a frequency response."""
 
+from collections.abc import Callable
 from itertools import groupby
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -20,14 +22,12 @@ from reports.sections import identified, identify_campaign, identify_records
 from reports.sections.measured import decibels_and_degrees
 
 
-def section(result: BenchResult | CampaignAnswer | FrequencyResult | ResponseResult | Plan) -> doc.Section:
-    if isinstance(result, BenchResult):
-        return identify_records.section(result)
-    if isinstance(result, CampaignAnswer):
-        return identify_campaign.section(result)
-    if isinstance(result, FrequencyResult):
-        return _two_mass(result)
-    return _plan(result) if isinstance(result, Plan) else _of_loop(result)
+def section(result: Identified | Plan) -> doc.Section:
+    made: dict[type, Callable[[Any], doc.Section]] = {
+        BenchResult: identify_records.section, CampaignAnswer: identify_campaign.section, Plan: _plan,
+        FrequencyResult: _two_mass, ResponseResult: _of_loop,
+    }  # fmt: skip
+    return made[type(result)](result)
 
 
 def write(result: Identified | Plan, folder: Path | None) -> list[str]:

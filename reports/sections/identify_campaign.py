@@ -119,12 +119,11 @@ def suggestion_blocks(suggestion: CampaignSuggestion) -> list[doc.Block]:
         rows.append((" to ".join(ends), *point, 100.0 * same[-1].remaining))
     goal = "the margins'" if suggestion.criterion == "margins" else "the coefficients'"
     blocks = [doc.table(f"Runs that would shrink {goal} uncertainty most", columns, rows)]
-    if suggestion.largest_shared is not None:
-        note = (
-            f"{100.0 * suggestion.shared_part:.0f} % of the margins' variance comes from errors that all "
-            f"runs share and no further run reduces; the largest is the {suggestion.largest_shared}."
-        )
-        blocks.append(doc.text(note))
+    note = (
+        f"{100.0 * suggestion.shared_part:.0f} % of the margins' variance comes from errors that all "
+        f"runs share and no further run reduces; the largest is the {suggestion.largest_shared}."
+    )
+    blocks += [] if suggestion.largest_shared is None else [doc.text(note)]
     margins = [
         doc.of("label", "label", "Margin"),
         doc.of("value", "value", "Value", format="sig:4"),
@@ -187,9 +186,8 @@ def surface_figure(fit: SurfaceFit) -> doc.Block:
         place = [p.speed_rad_s for p in here], [1e3 * p.torque_Nm for p in here]
         panel.points(*place, label, **style.marked(k))
     named = {o.run for o in fit.outliers}
-    for point in fit.points:
-        if point.run in named:
-            _ring(panel, (point.speed_rad_s, 1e3 * point.torque_Nm), point.run, 14.0)
+    for point in (one for one in fit.points if one.run in named):
+        _ring(panel, (point.speed_rad_s, 1e3 * point.torque_Nm), point.run, 14.0)
     panel.y.limits(low=0.0)
     caption = "Friction torque of every run and the fitted surface, a line for each load"
     return doc.figure("identification_surface", chart, caption)

@@ -78,8 +78,7 @@ def _result(result: BenchResult, axis: str) -> str:
 
 
 def _intro(result: BenchResult) -> str:
-    model = result.model
-    recipe = model.recipe
+    model, recipe = result.model, result.model.recipe
     many = f"{len(result.records)} records, " if len(result.records) > 1 else ""
     rest = sum(record.rows_at_rest for record in model.records)
     ends = any(recipe.part(len(record)).stop < len(record) for record in result.records)
@@ -106,8 +105,7 @@ def _parameters(model: JointModel, axis: str) -> doc.Block:
     """Values, their standard errors as published recipes give them, and as the record really tells."""
     white = dict(zip(model.names, model.white_errors.tolist(), strict=True))
     more = [doc.of(white.get, "white", "Error if white", format="sig:3")]
-    if model.bias:
-        more.append(doc.of(dict(model.bias).get, "bias", "Bias removed", format="sig:2"))
+    more += [doc.of(dict(model.bias).get, "bias", "Bias removed", format="sig:2")] if model.bias else []
     note = (
         "White residuals: ordinary least squares, as is usually published. Standard error: of "
         "residuals that are correlated and not alike everywhere, and the scatter between records where there "
@@ -117,13 +115,13 @@ def _parameters(model: JointModel, axis: str) -> doc.Block:
     return identified.parameter_table("Identified parameters", model, note, axis=axis, more=more)
 
 
-def _own_share(one: DesignValue) -> str:
-    return show(100.0 * one.allowed, "sig:2") + " assumed" * one.assumed
-
-
 def _against_design(result: BenchResult) -> doc.Block:
     """Each number beside what the records say of it; those that the design keeps at the end."""
     model, axis, values = result.model, result.design.axis, result.design_values
+
+    def own_share(one: DesignValue) -> str:
+        return show(100.0 * one.allowed, "sig:2") + " assumed" * one.assumed
+
     columns = [
         doc.of(lambda one: parameter(one.name, axis).label, "name", "Number"),
         doc.of("design", "design", "Design", format="sig:4"),
@@ -131,7 +129,7 @@ def _against_design(result: BenchResult) -> doc.Block:
         doc.of(lambda one: parameter(one.name, axis).unit, "unit", "Unit"),
         doc.of("ratio", "ratio", "Records over design", format="sig:4"),
         doc.of("error", "error", "Standard error", format="sig:2"),
-        doc.of(_own_share, "allowed", "Design's own uncertainty", "%"),
+        doc.of(own_share, "allowed", "Design's own uncertainty", "%"),
         doc.of(lambda one: "yes" if one.agrees else "no", "agrees", "Agrees"),
     ]
     note = (
@@ -218,15 +216,13 @@ def _residual_table(tests: Sequence[ResidualTest]) -> doc.Block:
 
 
 def _figures(part: RecordFit, tests: Sequence[ResidualTest], axis: str) -> list[doc.Block]:
-    own = [test for test in tests if test.record == part.name]
-    unit = "N" if axis == "linear" else "N m"
-    friction, correlation = _friction(part, unit, speed_unit(axis)), _correlation(own)
-    named = f"{part.name}: "
-    return [
-        doc.figure("residual_time", _over_time(part, unit), f"{named}residual over time, and its spectrum"),
-        doc.figure("residual_correlation", correlation, f"{named}correlations of the residual, with bounds"),
-        doc.figure("residual_friction", friction, f"{named}friction over speed, rows and model"),
-    ]
+    own, unit = [test for test in tests if test.record == part.name], "N" if axis == "linear" else "N m"
+    drawn = (
+        ("time", _over_time(part, unit), "residual over time, and its spectrum"),
+        ("correlation", _correlation(own), "correlations of the residual, with bounds"),
+        ("friction", _friction(part, unit, speed_unit(axis)), "friction over speed, rows and model"),
+    )
+    return [doc.figure(f"residual_{name}", chart, f"{part.name}: {words}") for name, chart, words in drawn]
 
 
 def _over_time(part: RecordFit, unit: str) -> style.Chart:

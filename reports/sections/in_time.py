@@ -122,15 +122,12 @@ LOWEST = 0.02  # of the linear margin: what lies below is drawn here
 
 def remarks(items: Sequence[AmplitudeMargin]) -> list[str]:
     """Say where large motion takes more than a tenth of a margin, worst case of each loop and kind."""
-    worst: dict[tuple[str, str], AmplitudeMargin] = {}
+    worst: dict[tuple[str, str], tuple[float, AmplitudeMargin]] = {}
     for item in items:
-        if item.value is None or item.value > WORTH_SAYING * item.linear:
-            continue
-        key = item.loop, "" if _already(item) else item.kind  # as designed: whatever is varied
-        known = worst.get(key)
-        if known is None or item.value < (known.value or item.value):
-            worst[key] = item
-    return [remark(item) for item in worst.values()]
+        if item.value is not None and item.value <= WORTH_SAYING * item.linear:
+            key = item.loop, "" if _already(item) else item.kind  # as designed: whatever is varied
+            worst[key] = min(worst.get(key, (item.value, item)), (item.value, item), key=lambda one: one[0])
+    return [remark(item) for _, item in worst.values()]
 
 
 def remark(item: AmplitudeMargin) -> str:
@@ -168,8 +165,8 @@ def _amplitudes(items: Sequence[AmplitudeMargin]) -> doc.Block:
     panel.rule_y(1.0)
     panel.x.ticks = [(float(k), words) for k, words in enumerate(sizes)]
     panel.x.limits(-0.4, len(sizes) - 0.6)
-    values = [max(item.value / item.linear, LOWEST) for item in items if item.value]
-    panel.y.limits(min([*values, 1.0]) / 1.3, max([*values, 1.0]) * 1.5)
+    values = [1.0, *(max(item.value / item.linear, LOWEST) for item in items if item.value)]
+    panel.y.limits(min(values) / 1.3, max(values) * 1.5)
     panel.y.ticks = [(t, f"{t:g}") for t in (LOWEST, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0)]
     caption = (
         "Margins by the initial deviation from which the drive is let go: small, medium and large, limits "

@@ -92,16 +92,14 @@ def _between(of: AmplitudeBode, place: int) -> str:
 def _sawtooth_verdicts(sawtooth: Sawtooth) -> list[doc.VerdictItem]:
     if not (sawtooth.runs and sawtooth.applicable):
         return []
-    gain = max(abs(run.gain_error) for run in sawtooth.runs)
-    lag = max(abs(run.lag_error_deg) for run in sawtooth.runs)
+    gain, lag = (max(abs(getattr(r, of)) for r in sawtooth.runs) for of in ("gain_error", "lag_error_deg"))
     items = []
     for key, label, error, limit, of in (
         ("gain", "fundamental from 4/(πx)", gain, GAIN_TOLERANCE, Unit(100.0, "%")),
         ("lag", "lag from arccos(π/2x)", lag, LAG_TOLERANCE_DEG, Unit(1.0, "deg")),
     ):
         found: dict[str, Any] = {"value": of.scale * error, "limit": of.scale * limit, "unit": of.unit}
-        words = f"Sawtooth: difference of the {label}"
-        id = f"validation-sawtooth-{key}"
+        id, words = f"validation-sawtooth-{key}", f"Sawtooth: difference of the {label}"
         items.append(doc.verdict(id, words, passed=error <= limit, comparison="<=", **found))
     return items
 

@@ -45,17 +45,14 @@ def section(design: Design, border: Onset) -> doc.Section:
 def _chart(design: Design, border: Onset, scale: float, unit: str) -> style.Chart:
     title = "limit reached at this amplitude"
     chart, panel = style.plot(370.0, y=f"command amplitude, {unit}", log="y", legend=True, legend_title=title)
-    hertz = border.omega_rad_s / (2.0 * np.pi)
-    lowest = scale * border.amplitude_rad
-    there = np.isfinite(lowest)
-    full = _full(design) * scale
+    hertz, lowest = border.omega_rad_s / (2.0 * np.pi), scale * border.amplitude_rad
+    there, full = np.isfinite(lowest), _full(design) * scale
     top = 4.0 * max([full, *lowest[there][:1]]) if there.any() else 1.0
     bottom = max(0.6 * min(lowest[there], default=0.1), top / 1e6)
     panel.y.limits(bottom, top)
     style.frequency(panel, hertz)
     if there.any():
-        x, y = hertz[there].tolist(), lowest[there].tolist()
-        floor = bottom * 1e-3
+        x, y, floor = hertz[there].tolist(), lowest[there].tolist(), bottom * 1e-3
         panel.shape([([*x, x[-1], x[0]], [*y, floor, floor])], colour=style.GREEN, opacity=0.1)
     _onsets(panel, hertz, border.each_rad, scale)
     panel.note("linear below the lowest line", corner="bottom left", colour=style.MUTED)
@@ -187,9 +184,8 @@ def _regions(panel: style.Panel, cause: np.ndarray, xe: np.ndarray, ye: np.ndarr
         for a, b in pairwise([0, *(np.flatnonzero(np.diff(row)) + 1).tolist(), len(row)]):
             ring = ([xe[a], xe[b], xe[b], xe[a]], [ye[k], ye[k], ye[k + 1], ye[k + 1]])
             boxes.setdefault(CAUSES[row[a]], []).append(ring)
-    for name, rings in boxes.items():
-        if name in COLOURS:
-            panel.shape(rings, colour=COLOURS[name], opacity=0.28)
+    for name in (name for name in boxes if name in COLOURS):
+        panel.shape(boxes[name], colour=COLOURS[name], opacity=0.28)
 
 
 def _onsets(panel: style.Panel, hertz: np.ndarray, each_rad: Mapping[str, np.ndarray], scale: float) -> None:
@@ -202,8 +198,7 @@ def _onsets(panel: style.Panel, hertz: np.ndarray, each_rad: Mapping[str, np.nda
 
 def _deepest(mask: np.ndarray) -> tuple[int, int]:
     """Give the point furthest inside a region, weighing rows as two columns."""
-    outside = np.argwhere(~np.pad(mask, 1)) - 1
-    inside = np.argwhere(mask)
+    outside, inside = np.argwhere(~np.pad(mask, 1)) - 1, np.argwhere(mask)
     gaps = inside[:, None, :] - outside[None, :, :]
     depth = np.hypot(1.6 * gaps[..., 0], 0.6 * gaps[..., 1]).min(axis=1)
     row, column = inside[int(np.argmax(depth))]

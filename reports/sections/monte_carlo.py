@@ -103,7 +103,13 @@ def _verdict(result: MonteCarloResult, odds: Odds) -> doc.VerdictItem:
 def _why(result: MonteCarloResult, odds: Odds) -> str:
     case, verdict = result.case(odds), result.judged(odds)
     if verdict is Verdict.NOT_PROVEN:
-        return _unproven(odds, result.enough)
+        needed = samples_needed(result.enough)
+        most = "no number of samples" if math.isinf(needed) else f"at least {needed} samples, if all pass,"
+        most = "more samples" if odds.count >= needed else most
+        return (
+            f"{odds.passed} of {odds.count} samples show {100 * odds.low:.3f} % with 95 % confidence; "
+            f"{most} can show {100 * result.enough:g} %"
+        )
     if result.at_least is not None:
         met = verdict is Verdict.MET
         bound = f"at least {100 * odds.low:.3f}" if met else f"at most {100 * odds.high:.3f}"
@@ -116,17 +122,6 @@ def _why(result: MonteCarloResult, odds: Odds) -> str:
         return "every sample passes, but a loop is unstable in the worst case of the tolerance box"
     said = with_unit(case.value, case.unit, ".4g")
     return f"every sample passes, but the worst case of the tolerance box fails: {said}"
-
-
-def _unproven(odds: Odds, enough: float) -> str:
-    """Say what the samples show, and how many would show enough."""
-    needed = samples_needed(enough)
-    most = "no number of samples" if math.isinf(needed) else f"at least {needed} samples, if all pass,"
-    most = "more samples" if odds.count >= needed else most
-    return (
-        f"{odds.passed} of {odds.count} samples show {100 * odds.low:.3f} % with 95 % confidence; "
-        f"{most} can show {100 * enough:g} %"
-    )
 
 
 def _odds_table(result: MonteCarloResult) -> doc.Block:
@@ -160,17 +155,15 @@ def _figure_table(
     def quantile(percent: int, c: ColumnStatistics) -> float | None:
         return in_shown(dict(zip(c.shares, c.quantiles, strict=True)).get(percent / 100), c.unit)
 
-    def value(name: str, c: ColumnStatistics) -> float | None:
-        return in_shown(getattr(c, name), c.unit)
+    def of(name: str, label: str, format: str = "sig:4") -> doc.Shown:
+        return doc.of(lambda c: in_shown(getattr(c, name), c.unit), name, label, format=format)
 
     shown = [
         doc.of(lambda c: _words(c.name, load_unit), "figure", "Figure"),
         doc.of(lambda c: shown_unit(c.unit)[0], "unit", "Unit"),
-        doc.of(partial(value, "minimum"), "minimum", "Min", format="sig:4"),
+        of("minimum", "Min"),
         *(doc.of(partial(quantile, q), f"q{q:02d}", f"{q} %", format="sig:4") for q in _SHOWN),
-        doc.of(partial(value, "maximum"), "maximum", "Max", format="sig:4"),
-        doc.of(partial(value, "mean"), "mean", "Mean", format="sig:4"),
-        doc.of(partial(value, "std"), "std", "Std", format="sig:3"),
+        *(of("maximum", "Max"), of("mean", "Mean"), of("std", "Std", "sig:3")),
         doc.of("missing", "missing", "Missing", align="right"),
     ]
     note = (

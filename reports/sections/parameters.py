@@ -25,12 +25,8 @@ COLUMNS = [
     doc.of(lambda item: tolerance_words(item), "tolerance", "Tolerance"),
     doc.of("source", "source", "Source"),
 ]
-FACTS = [
-    doc.of("label", "label", "What"),
-    doc.of("value", "value", "Value"),
-    doc.of("grade", "grade", "Grade"),
-    doc.of("source", "source", "Source"),
-]
+_OF_FACTS = {"label": "What", "value": "Value", "grade": "Grade", "source": "Source"}
+FACTS = [doc.of(name, name, heading) for name, heading in _OF_FACTS.items()]
 
 
 def section(design: Design, warnings: Sequence[str] = ()) -> doc.Section:
@@ -60,15 +56,15 @@ def section(design: Design, warnings: Sequence[str] = ()) -> doc.Section:
 
 def _derived(design: Design) -> doc.Block:
     mass, unit = ("Inertia at the motor", "kg m²") if design.axis == "rotary" else ("Moving mass", "kg")
-    items = [
-        doc.fact("Total reduction N", float(f"{design.total_ratio:.6g}")),
-        doc.fact(mass, design.inertia_kgm2, unit),
-        doc.fact("Tick of the controller", design.controller.period_s * 1e6, "µs"),
-        doc.fact("Computing delay", design.controller.computing_delay_s * 1e6, "µs"),
-        doc.fact("Friction law", design.friction.law),
-        doc.fact("Load path", design.load.path),
-    ]
-    return doc.facts(items)
+    items = (
+        ("Total reduction N", float(f"{design.total_ratio:.6g}")),
+        (mass, design.inertia_kgm2, unit),
+        ("Tick of the controller", design.controller.period_s * 1e6, "µs"),
+        ("Computing delay", design.controller.computing_delay_s * 1e6, "µs"),
+        ("Friction law", design.friction.law),
+        ("Load path", design.load.path),
+    )
+    return doc.facts(doc.fact(*item) for item in items)
 
 
 def _written(text: str) -> str:

@@ -16,6 +16,7 @@ from nonlinear.runs.trajectory import COMMAND_UNITS
 from reports import document as doc
 from reports.charts import style
 from reports.charts.svg import paper_svg
+from reports.sections.names import output_unit
 
 Signals = list[tuple[str, npt.NDArray[np.float64]]]
 Acting = tuple[Limiter, ...]
@@ -104,8 +105,7 @@ def _energy(run: Trajectory) -> doc.Block:
 
 def chart_of(run: Trajectory) -> style.Chart:
     """Position, speed, current and voltage on one time axis, thinned with the peaks kept."""
-    linear = run.axis == "linear"
-    angle, unit = (1e3, "mm") if linear else (180.0 / np.pi, "deg")
+    linear, (angle, unit) = run.axis == "linear", output_unit(run.axis)
     command: dict[Stage, Signals] = {run.stage: [("command", run.reference_rad)]}
     speed = [("speed", run.motor_speed_rad_s)]
     speed += [(name, run.ratio * values) for name, values in command.get("velocity", [])]

@@ -43,12 +43,11 @@ def _result(result: Specification) -> str:
         return ""
     scale, unit = output_unit(result.design.axis)
     rate, push, limits = f"{unit}/s", f"{unit}/s²", result.design.command
-    both = (
+    parts = []
+    for value, found, per in (
         (one.figures.output_rate_rad_s, one.simulated_rate_rad_s, rate),
         (one.figures.acceleration_rad_s2, one.simulated_acceleration_rad_s2, push),
-    )
-    parts = []
-    for value, found, per in both:
+    ):
         if value is not None and math.isfinite(value):
             unlike = found is not None and abs(found - value) > ALIKE * abs(value)
             also = f" (simulated {significant(scale * found)})" if found is not None and unlike else ""
@@ -116,12 +115,17 @@ def _planes(result: Specification) -> list[doc.Block]:
         for bound in result.plane.bounds:
             inside = (0.97 * widest, 1.2 * top)
             _bound(panel, bound.name, fast * bound.speed_rad_s, strong * bound.torque_Nm, inside)
-        start = f"steady motion at {load:g} "
-        for k, each in enumerate(one for one in result.plane.demands if one.name.startswith(start)):
-            panel.curve(
-                fast * each.speed_rad_s, strong * each.torque_Nm, each.name, colour=style.INK, width=1.5,
-                dash=2, marker="os^D"[k % 4], size=5.0, every=8,
-            )  # fmt: skip
+        steady = [d for d in result.plane.demands if d.name.startswith(f"steady motion at {load:g} ")]
+        for k, each in enumerate(steady):
+            look = {
+                "colour": style.INK,
+                "width": 1.5,
+                "dash": 2,
+                "marker": "os^D"[k % 4],
+                "size": 5.0,
+                "every": 8,
+            }
+            panel.curve(fast * each.speed_rad_s, strong * each.torque_Nm, each.name, **look)
         caption = (
             f"{'Force' if linear else 'Motor torque'} over speed at {load:g} {unit}: bounds, what steady "
             "motion needs, and the paths of standard manoeuvres at full deflection. Below zero it brakes; "
@@ -151,9 +155,10 @@ def _fastest(result: Specification, moves: list[Manoeuvre]) -> float:
     """Speed that the frame must show: the bounds in reach, and the paths."""
     highest = max((float(np.max(np.abs(move.speed_rad_s))) for move in moves), default=1.0)
     bounds = {c.name: c.speed_rad_s for c in result.plane.bounds}
-    upright = [float(bounds["speed limit"][0])] if "speed limit" in bounds else []
-    crossing = [float(bounds["voltage limit"][-1])] if "voltage limit" in bounds and not upright else []
-    return 1.12 * max([highest, *upright, *[c for c in crossing if c < 4.0 * highest]])
+    if "speed limit" in bounds:
+        return 1.12 * max(highest, float(bounds["speed limit"][0]))
+    crossing = float(bounds["voltage limit"][-1]) if "voltage limit" in bounds else 0.0
+    return 1.12 * max(highest, crossing if crossing < 4.0 * highest else 0.0)
 
 
 def _manoeuvre_table(result: Specification) -> doc.Block:

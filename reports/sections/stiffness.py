@@ -120,8 +120,7 @@ def _or_infinite(stiffness: float) -> float | str:
 
 
 def _lost_motion(result: Stiffness) -> doc.Block:
-    size = output_unit(result.design.axis).column("sig:4")
-    lost = result.lost_motion
+    size, lost = output_unit(result.design.axis).column("sig:4"), result.lost_motion
     assert lost is not None
     columns = [
         doc.of(lambda row: row[0], "what", "What"),

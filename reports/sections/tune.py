@@ -22,9 +22,9 @@ def section(result: TuningResult) -> doc.Section:
         *table(result.confirmed, result.before.load_unit, "Confirmed by certified margins"),
         *([_curve(result)] if result.trade_off else []),
         *([checks(result)] if result.checks else []),
-        *(doc.remark(note) for note in result.notes),
+        *map(doc.remark, result.notes),
+        doc.details("How the start gains were found", list(map(doc.text, result.steps))),
     ]
-    blocks.append(doc.details("How the start gains were found", [doc.text(step) for step in result.steps]))
     title = "Tuning" if result.feasible else "Tuning: the requirements cannot be met"
     return doc.section("tuning", title, blocks, result=summary(result), status=result.verdict.role())
 
@@ -130,8 +130,7 @@ def _curve(result: TuningResult) -> doc.Block:
         (True, "o", style.GREEN, "all other requirements met"),
         (False, "x", style.RED, "another requirement fails"),
     ):
-        chosen = [(p.bandwidth_hz, p.phase_margin_deg) for p in result.trade_off if p.feasible is ok]
-        if chosen:
+        if chosen := [(p.bandwidth_hz, p.phase_margin_deg) for p in result.trade_off if p.feasible is ok]:
             xs, ys = zip(*chosen, strict=True)
             panel.points(xs, ys, legend, marker=marker, colour=colour, size=7.0)
     required: style.Style = {"colour": style.RED, "width": 1.2, "dash": 1, "seen": True, "label": "required"}

@@ -73,6 +73,8 @@ XDC_DEFAULT = XDC.replace("actual", "default").replace(
 )
 PEAK, ERPM = sqrt(3) / 2, 7 * 60 / (2 * pi)
 GAINS = [f"control.{stage}.{key}" for stage in ("current", "velocity") for key in ("gain", "integral_time")]
+LIMITS = {"encoder.filter_time": "1 ms", "limits.current_rate": "1 A/s"}
+PID = {"control.position.integral_time": "1 s", "control.position.derivative_time": "1 s"}
 
 
 def without(stage: str) -> Design:
@@ -142,31 +144,6 @@ def test_each_makers_gains_in_the_units_of_the_model(text, stage, wanted, more, 
     assert result.notes[-1].endswith(left)
 
 
-@pytest.mark.parametrize(("text", "words"), [
-    (BY_VOLTAGE, r"by voltage; allowed: a design without \[control.current\]"),
-    (TWO_MOTORS, "several motors: motor, other; allowed: the lines of one of them"),
-    (ODRIVE.replace('{"phase_i', '{"motor_type": 2, "phase_i'), "motor_type = 2: allowed: 0"),
-    (EPOS, "no velocity loop inside its position loop"),
-    (ODRIVE.replace("20.0, ", "20.0, x", 1), "line 3"),
-])  # fmt: skip
-def test_what_the_design_cannot_hold_is_refused(text: str, words: str, tmp_path: Path) -> None:
-    refused(taken, tmp_path, text, BASE, match=words)
-
-
-@pytest.mark.parametrize(("text", "key"), [
-    (ODRIVE.replace('constant": 0.04', 'constant": 0'), "velocity.gain"),
-    (ODRIVE.replace("20.0", '"inf"', 2), "position.gain"),
-    (ODRIVE.replace("20.0", "NaN", 2), "position.gain"),
-    (VESC.replace(">14<", ">0<"), "velocity.gain"),
-    (VESC.replace("0.004", "0").replace("0.008", "0"), "velocity.integral_time"),
-])  # fmt: skip
-def test_numbers_that_say_nothing_are_left_and_said(text: str, key: str, tmp_path: Path) -> None:
-    """A constant of 0, an infinite gain, no poles, no gain at all: the design keeps what it has."""
-    result = taken(tmp_path, text, BASE)
-    assert parameter_value(result.design, f"control.{key}") == parameter_value(BASE, f"control.{key}")
-    assert any(note.endswith(f"not taken, control.{key} stays as it is") for note in result.notes)
-
-
 @pytest.mark.parametrize(("text", "kept"), [
     (ODRIVE, ()),
     (VESC, ("integral_time", "derivative_time", "derivative_filter", "friction_feedforward")),
@@ -193,46 +170,72 @@ def test_what_no_such_controller_has_goes(text: str, kept: tuple[str, ...], tmp_
         assert (loop.integral_time_s, loop.derivative_time_s) == pytest.approx((20 / 40, 0.2 / 20))
 
 
-def test_a_rated_current_above_the_drives_is_lowered(tmp_path: Path) -> None:
-    """The drive gives no more than its limit for any time, so the motor's rating is never reached."""
-    base = with_overrides(BASE, {"limits.continuous_current": "1 A", "limits.peak_current": "2 A"})
-    result = taken(tmp_path, SIMPLEFOC + "motor.current_limit = 0.9;", base)
-    limits = result.design.limits
-    assert limits.continuous_current_A == limits.peak_current_A == pytest.approx(PEAK * 0.9)
-    assert "limits.continuous_current: 1 A dc is lowered to limits.peak_current" in result.notes
-    same = taken(tmp_path, SIMPLEFOC + "motor.current_limit = 1.5;", base)
-    assert same.design.limits.continuous_current_A == 1.0
-
-
 @pytest.mark.parametrize(("text", "stage", "words"), [
+    (BY_VOLTAGE, "", r"by voltage; allowed: a design without \[control.current\]"),
+    (TWO_MOTORS, "", "several motors: motor, other; allowed: the lines of one of them"),
+    (ODRIVE.replace('{"phase_i', '{"motor_type": 2, "phase_i'), "", "motor_type = 2: allowed: 0"),
+    (EPOS, "", "no velocity loop inside its position loop"),
+    (ODRIVE.replace("20.0, ", "20.0, x", 1), "", "line 3"),
+    # a base that fits by itself is not to blame: a new stage, a limit of the file
     (VESC, "velocity", "control.velocity.gain is of settings: s_pid_kp = 0.004, l_current_max = 60"),
     (EPOS + "\n[3001sub1]\nParameterValue=7000", "velocity",
      "limits.peak_current is of settings: 0x3001.02 = 6000"),
 ])  # fmt: skip
-def test_a_refusal_tells_what_the_file_brought(text: str, stage: str, words: str, tmp_path: Path) -> None:
-    """A base that fits by itself is not to blame: a new stage, a limit of the file."""
+def test_what_the_design_cannot_hold_is_refused(text: str, stage: str, words: str, tmp_path: Path) -> None:
     refused(taken, tmp_path, text, without(stage), match=words)
 
 
-LIMITS = {"encoder.filter_time": "1 ms", "limits.current_rate": "1 A/s"}
-PID = {"control.position.integral_time": "1 s", "control.position.derivative_time": "1 s"}
+RATED = {"limits.continuous_current": "1 A", "limits.peak_current": "2 A"}
+TICKS = {"control.period": "100 us", "control.computing_delay": "50 us"}
+NO_CONSTANT = ODRIVE.replace('"torque_constant": 0.04,', "").replace('"cpr": 8192', '"use_index": true')
+NEWEST = NO_CONSTANT[:-1] + ', "inc_encoder0": {"config": {"cpr": 4000}}}'
+HARD = """{"axis0": {"config": {"motor": {"current_soft_max": 20.0, "current_hard_max": 36.0}}}}"""
+OFF = f"{EPOS}\n[30A1sub4]\nParameterValue=0"
+STAYS, GONE = "not taken, {} stays as it is", ": none, {} is left out"
 
 
-@pytest.mark.parametrize(("text", "stage", "key"), [
-    (ODRIVE.replace("0.32", "0"), "", "control.velocity.integral_time"),
-    (EPOS.replace("780000", "0"), "velocity", "control.position.integral_time"),
-    (EPOS.replace("16000", "0"), "velocity", "control.position.derivative_time"),
-    (SIMPLEFOC.replace("0.005f", "0"), "", "encoder.filter_time"),
-    (ODRIVE.replace("10.0,", "Infinity,"), "", "limits.speed"),
-    (LIMITED.replace("1000", "0"), "", "limits.current_rate"),
+@pytest.mark.parametrize(("text", "stage", "changes", "note", "key", "wanted"), [
+    # a constant of 0, an infinite gain, no poles, no gain at all: the design keeps what it has
+    (ODRIVE.replace('constant": 0.04', 'constant": 0'), "", {}, STAYS, "control.velocity.gain", ...),
+    (ODRIVE.replace("20.0", '"inf"', 2), "", {}, STAYS, "control.position.gain", ...),
+    (ODRIVE.replace("20.0", "NaN", 2), "", {}, STAYS, "control.position.gain", ...),
+    (VESC.replace(">14<", ">0<"), "", {}, STAYS, "control.velocity.gain", ...),
+    (VESC.replace("0.004", "0").replace("0.008", "0"), "", {}, STAYS, "control.velocity.integral_time", ...),
+    # an integral gain of 0, no limit, no filter: nothing of the base stays in its place
+    (ODRIVE.replace("0.32", "0"), "", {}, GONE, "control.velocity.integral_time", None),
+    (EPOS.replace("780000", "0"), "velocity", PID, GONE, "control.position.integral_time", None),
+    (EPOS.replace("16000", "0"), "velocity", PID, GONE, "control.position.derivative_time", None),
+    (SIMPLEFOC.replace("0.005f", "0"), "", LIMITS, GONE, "encoder.filter_time", None),
+    (ODRIVE.replace("10.0,", "Infinity,"), "", {}, GONE, "limits.speed", None),
+    (LIMITED.replace("1000", "0"), "", LIMITS, GONE, "limits.current_rate", None),
+    # the drive gives no more than its limit for any time, so the motor's rating is never reached
+    (SIMPLEFOC + "motor.current_limit = 0.9;", "", RATED, "{}: 1 A dc is lowered to limits.peak_current",
+     "limits.continuous_current", PEAK * 0.9),
+    (SIMPLEFOC + "motor.current_limit = 0.9;", "", RATED, "", "limits.peak_current", PEAK * 0.9),
+    (SIMPLEFOC + "motor.current_limit = 1.5;", "", RATED, "", "limits.continuous_current", 1.0),
+    # what the file does not say: ticks of the new period, a derivative's filter; a feed-forward that is off
+    (EPOS, "velocity", TICKS, "{} = 5e-05 s stays as it is: 1.25 ticks of the new period, 0.5 of the old",
+     "control.computing_delay", 5e-5),
+    (EPOS, "velocity", PID, "control.position.derivative_filter stays as it is", "control.period", 4e-5),
+    (OFF, "velocity", {}, ": 0x30A2.01, 0x30A2.02", "control.period", 4e-5),
+    # a gain in torque without the constant that turns it into amperes; the newest firmware's encoder
+    (NEWEST, "", {}, "vel_gain: needs axis0.motor.config.torque_constant for control.velocity.gain",
+     "encoder.counts_per_rev", 4000),
+    (HARD, "", {}, ": axis0.config.motor.current_hard_max", "limits.peak_current", PEAK * 20),
 ])  # fmt: skip
-def test_what_the_controller_has_not_goes(text: str, stage: str, key: str, tmp_path: Path) -> None:
-    """An integral gain of 0, no limit, no filter: nothing of the base stays in its place."""
-    base = with_overrides(without(stage), (PID if stage else LIMITS))
+def test_what_a_file_does_to_a_key_is_told(text, stage, changes, note, key, wanted, tmp_path) -> None:
+    base = with_overrides(without(stage), changes)
     result = taken(tmp_path, text, base)
-    assert key in base.parameters
-    assert key not in result.design.parameters
-    assert any(note.endswith(f": none, {key} is left out") for note in result.notes)
+    assert sum(one.endswith(note.format(key)) for one in result.notes) == 1 or not note
+    assert key in base.parameters or wanted is not None
+    assert (key in result.design.parameters) == (wanted is not None)
+    if wanted is not None:
+        wanted = parameter_value(base, key) if wanted is ... else wanted
+        assert parameter_value(result.design, key) == pytest.approx(wanted, rel=1e-15)
+    if text is HARD:  # the name that stands in the file
+        assert result.design.parameters[key].source.endswith("axis0.config.motor.current_soft_max = 20.0")
+    slower = result.design.controller.period_s != base.controller.period_s
+    assert any("delay" in one for one in result.notes) == slower
 
 
 def test_what_a_sketch_says_of_its_motor_is_told_where_it_applies(tmp_path: Path) -> None:
@@ -247,38 +250,6 @@ def test_what_a_sketch_says_of_its_motor_is_told_where_it_applies(tmp_path: Path
         notes = taken(tmp_path, text, without(stage)).notes
         for start in by_voltage + by_current:
             assert any(note.startswith(start) for note in notes) == (start in words)
-
-
-def test_what_the_file_does_not_say_is_told(tmp_path: Path) -> None:
-    """The computing delay in ticks of the new period; a derivative's filter; a feed-forward that is off."""
-    base = with_overrides(
-        without("velocity"), {"control.period": "100 us", "control.computing_delay": "50 us"}
-    )
-    notes = taken(tmp_path, EPOS + "\n[30A1sub4]\nParameterValue=0", base).notes
-    kept = "control.computing_delay = 5e-05 s stays as it is: 1.25 ticks of the new period, 0.5 of the old"
-    assert kept in notes
-    assert any(note.endswith("control.position.derivative_filter stays as it is") for note in notes)
-    assert notes[-1].endswith(": 0x30A2.01, 0x30A2.02")
-    assert not any("delay" in note for note in taken(tmp_path, SIMPLEFOC, BASE).notes)
-
-
-def test_the_source_is_the_name_in_the_file(tmp_path: Path) -> None:
-    text = """{"axis0": {"config": {"motor": {"current_soft_max": 20.0, "current_hard_max": 36.0}}}}"""
-    result = taken(tmp_path, text, BASE)
-    assert result.design.parameters["limits.peak_current"].source.endswith(
-        "settings: axis0.config.motor.current_soft_max = 20.0"
-    )
-    assert result.notes[-1].endswith(": axis0.config.motor.current_hard_max")
-
-
-def test_numbers_that_make_a_key_together_are_asked_for(tmp_path: Path) -> None:
-    """A gain in torque without the constant that turns it into amperes; the newest firmware's encoder."""
-    text = ODRIVE.replace('"torque_constant": 0.04,', "").replace('"cpr": 8192', '"use_index": true')
-    text = text[:-1] + ', "inc_encoder0": {"config": {"cpr": 4000}}}'
-    result = taken(tmp_path, text, BASE)
-    wanted = "vel_gain: needs axis0.motor.config.torque_constant for control.velocity.gain"
-    assert sum(note.endswith(wanted) for note in result.notes) == 1
-    assert parameter_value(result.design, "encoder.counts_per_rev") == 4000
 
 
 def test_the_command_says_what_it_took_and_what_it_left(tmp_path, capsys) -> None:

@@ -265,14 +265,6 @@ def test_keys_are_found_by_the_words_of_sheets_and_controllers(cli, word: str, k
     assert key in [one["path"] for one in cli.data("keys", word)["keys"]]
 
 
-@pytest.mark.parametrize(
-    ("written", "counts"), [("4096 counts/rev", 4096), ("1024 lines/turn", 4096), ("4000 inc/rev", 4000)]
-)
-def test_counts_may_be_said_to_be_per_turn(written: str, counts: int) -> None:
-    design = read_design_text(f'{DRIVE}[encoder]\ncounts_per_rev = "{written}"\n')
-    assert design.encoder.counts_per_rev == counts
-
-
 def test_what_a_file_does_not_say_is_explained_and_warned_of(cli, tmp_path) -> None:
     file = tmp_path / "direct.toml"
     file.write_text(DRIVE.replace("19.2", '"1/19.2"') + '[control.current]\ngain = "9 Hz"\n')

@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 import tomli_w
-from hypothesis import HealthCheck, assume, given, reject, settings
+from hypothesis import HealthCheck, assume, given, settings
 from hypothesis import strategies as st
 
 from actuator_lti.design import (
@@ -195,36 +195,24 @@ def test_keys_that_need_others_and_tables_without_keys_survive() -> None:
     survives(drive)
 
 
-@RELAXED
-@given(design_trees())
-def test_any_design_survives_being_written(tree: dict[str, Any]) -> None:
-    survives(read_design_text(tomli_w.dumps(tree), "any"))
+def _shuffled(value: Any, random: Any) -> Any:
+    if not isinstance(value, dict):
+        return [_shuffled(item, random) for item in value] if isinstance(value, list) else value
+    items = list(value.items())
+    random.shuffle(items)
+    return {key: _shuffled(item, random) for key, item in items}
 
 
 @RELAXED
-@given(design_trees(), st.randoms(use_true_random=False))
-def test_the_order_of_keys_does_not_matter(tree: dict[str, Any], random: Any) -> None:
-    def shuffled(value: Any) -> Any:
-        if not isinstance(value, dict):
-            return [shuffled(item) for item in value] if isinstance(value, list) else value
-        items = list(value.items())
-        random.shuffle(items)
-        return {key: shuffled(item) for key, item in items}
-
-    first = read_design_text(tomli_w.dumps(tree), "any")
-    second = read_design_text(tomli_w.dumps(shuffled(tree)), "any")
-    assert design_hash(first) == design_hash(second)
-
-
-@RELAXED
-@given(design_trees(), st.floats(0.9, 1.1))
-def test_a_changed_design_survives_too_and_can_be_changed_back(tree: dict[str, Any], factor: float) -> None:
+@given(design_trees(), st.randoms(use_true_random=False), st.floats(0.9, 1.1))
+def test_any_design_survives_being_written_in_any_order_changed_and_changed_back(tree, random, factor):
     design = read_design_text(tomli_w.dumps(tree), "any")
+    survives(design)
+    assert design_hash(read_design_text(tomli_w.dumps(_shuffled(tree, random)), "any")) == design_hash(design)
     nominal = {path: value for path, value, _ in tolerances(design)}
     try:
         changed = with_values(design, {path: value * factor for path, value in nominal.items()})
     except InputError:  # a supply that no longer reaches the speed, say
-        reject()
+        return
     assert read_design_text(write_design(changed), "any") == changed
-    back = with_values(changed, nominal, check=False)
-    assert design_hash(back) == design_hash(design)
+    assert design_hash(with_values(changed, nominal, check=False)) == design_hash(design)

@@ -15,7 +15,6 @@ from actuator_lti.design.objects import OBJECTS, PER_RPM, calibration, export_ob
 from actuator_lti.design.settings_file import (
     parse_label,
     parse_settings,
-    read_settings,
     update_settings_xml,
     write_settings_toml,
     write_settings_xml,
@@ -203,13 +202,6 @@ def test_a_device_configuration_with_more_in_it_is_read_and_updated_in_place() -
     assert values == {"0x2348.00": 1, "0x2348.01": 60, "0x6083.00": 300}
     assert left == ("0x2342.01",)
     assert all(words in text for words in ('actualValue="0x3C"', "<ProfileName>x</", 'defaultValue="0x12"'))
-
-
-def test_a_settings_file_is_known_by_its_first_sign(tmp_path) -> None:
-    some = objects({"0x2348.01": 50})
-    (tmp_path / "a.xdc").write_text(write_settings_xml(some))
-    (tmp_path / "b.toml").write_text(write_settings_toml(some))
-    assert read_settings(tmp_path / "a.xdc") == read_settings(tmp_path / "b.toml") == some
 
 
 def test_the_calibration_torque_feed_forward_and_a_torque_constant_that_sets_the_back_emf_too() -> None:

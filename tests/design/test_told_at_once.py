@@ -67,6 +67,15 @@ def contradicted() -> Any:
             _override(tree, path, value, AMBER)
     del tree["control"]["position"]["gain"]
     assert _told(tree) == {path for _, path, _ in RELATIONS}
+    with pytest.raises(Mistakes) as caught:
+        design_from_tree(tree, "my.toml")
+    assert all(words in str(caught.value) for words in (
+        "every = 3: allowed: a multiple of control.velocity.every = 2", "at most 100 ticks of",
+        "limits.peak_current = 12 A", "peak_current above continuous", "faster than limits.speed",
+        "needs command.acceleration",
+        "filter_time = 31 us: allowed: 0, or above T/pi of the outermost loop, 9.5493e-05 s",  # 3 ticks
+        "needs supply.capacitance", "too fast for its period", "a tenth of a tick",
+    ))  # fmt: skip
     return tree
 
 

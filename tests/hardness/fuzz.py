@@ -20,6 +20,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cache
+from itertools import count, cycle
 from pathlib import Path
 
 HERE = Path(__file__).parent
@@ -53,18 +54,19 @@ def attack(target: Target, seed: int, number: int) -> Find | None:
         with limited(), warnings.catch_warnings():
             warnings.simplefilter("ignore")
             target.attack(path)
-    except InputError as error:
-        told = str(error)
-        if all(line.isprintable() and len(line) < 2000 for line in told.split("\n")):
-            return None
-        return Find(target.name, number, "no printable line", repr(told[:300]), data)
     except NumericalError:
         return None
-    except TooSlow:
-        return Find(target.name, number, f"more than {LIMIT_S} s", place(sys.exc_info()[1]), data)
+    except InputError as error:
+        if all(line.isprintable() and len(line) < 2000 for line in str(error).split("\n")):
+            return None
+        said = "no printable line", repr(str(error)[:300])
+    except TooSlow as error:
+        said = f"more than {LIMIT_S} s", place(error)
     except Exception as error:  # noqa: BLE001 - whatever it is, it is a find
-        return Find(target.name, number, f"{type(error).__name__}: {str(error)[:300]}", place(error), data)
-    return None
+        said = f"{type(error).__name__}: {str(error)[:300]}", place(error)
+    else:
+        return None
+    return Find(target.name, number, *said, data)
 
 
 @cache
@@ -101,8 +103,8 @@ def limited() -> Iterator[None]:
         signal.signal(signal.SIGALRM, before)
 
 
-def place(error: BaseException | None) -> str:
-    frames = traceback.extract_tb(error.__traceback__) if error else []
+def place(error: BaseException) -> str:
+    frames = traceback.extract_tb(error.__traceback__)
     ours = [f for f in frames if "site-packages" not in f.filename and "/lib/python" not in f.filename]
     last = (ours or frames)[-1] if frames else None
     return f"{Path(last.filename).name}:{last.lineno} {last.name}" if last else ""
@@ -110,15 +112,11 @@ def place(error: BaseException | None) -> str:
 
 def rounds(chosen: tuple[Target, ...]) -> Iterator[tuple[Target, int]]:
     """Inputs without end, of each target for some time."""
-    number = Counter[str]()
-    while True:
-        for target in chosen:
-            end = time.monotonic() + SLICE_S
-            while True:
-                yield target, number[target.name]
-                number[target.name] += 1
-                if time.monotonic() > end:
-                    break
+    numbers = {target: count() for target in chosen}
+    for target in cycle(chosen):
+        end = time.monotonic() + SLICE_S
+        while time.monotonic() < end:
+            yield target, next(numbers[target])
 
 
 def main() -> int:

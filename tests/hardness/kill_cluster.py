@@ -107,10 +107,9 @@ class Cluster:
         process.wait()
 
     def end(self) -> None:
-        for process in (self.scheduler, *self.workers):
-            if process is not None:
-                process.kill()
-                process.wait()
+        for process in filter(None, (self.scheduler, *self.workers)):
+            process.kill()
+            process.wait()
         self.scheduler, self.workers = None, []
 
 

@@ -18,6 +18,7 @@ SCALARS: list[Any] = [
     [None], {"a": 1}, "pass", "fail", "table", "sig:3", "sig:999", "fix:-1", "1979-05-27", "NaN", 10**30,
 ]  # fmt: skip
 _WINDOW = 16_384
+NUMBERS = (b"0", b"-1", b"1e300", b"1e-300", b"nan", b"inf", b"1e400", b"3.5", b"2147483648")
 NUMBER = re.compile(rb"(?<![\w.\"])[-+]?\d+\.?\d*(?:[eE][-+]?\d+)?")
 QUANTITY = re.compile(rb'"([-+]?\d+\.?\d*(?:[eE][-+]?\d+)?)( [^"\n]*)?"')
 
@@ -38,10 +39,8 @@ def damaged(data: bytes, draw: random.Random) -> bytes:
         elif kind == 3:
             other = draw.randrange(len(out) + 1)
             out[place:place] = out[other : other + draw.choice((1, 8, 64, 512))]
-        elif kind == 4:
-            out = bytearray(_line_fault(bytes(out), draw))
         else:
-            out = bytearray(_number_fault(bytes(out), draw))
+            out = bytearray((_line_fault if kind == 4 else _number_fault)(bytes(out), draw))
     if draw.random() < 0.05:
         del out[draw.randrange(len(out) + 1) :]
     return bytes(out)
@@ -78,9 +77,7 @@ def _number_fault(data: bytes, draw: random.Random) -> bytes:
 
 def _number(text: bytes, draw: random.Random) -> bytes:
     if draw.random() < 0.3:
-        return draw.choice(
-            (b"0", b"-1", b"1e300", b"1e-300", b"nan", b"inf", b"1e400", b"3.5", b"2147483648")
-        )
+        return draw.choice(NUMBERS)
     return f"{float(text[:300]) * 10.0 ** draw.uniform(-9.0, 9.0):.6g}".encode()
 
 

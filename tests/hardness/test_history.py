@@ -79,10 +79,8 @@ def test_a_lost_history_closes_the_gate_until_somebody_says_so(site, lost: str) 
     index = (site / "index.html").read_bytes()
     LOSSES[lost](site)
     for _ in range(2):  # the first refusal must not make the second night pass
-        with pytest.raises(HistoryLost, match="--accept-lost-history") as caught:
+        with pytest.raises(HistoryLost, match=r"^.*2 night\(s\) and 1 approval\(s\).*--accept-lost-history$"):
             night(site, 3.0)
-        assert "2 night(s) and 1 approval(s)" in str(caught.value)
-        assert "\n" not in str(caught.value)
     with pytest.raises(HistoryLost):
         approved(site)
     assert (site / "index.html").read_bytes() == index
@@ -107,22 +105,20 @@ def test_a_site_of_an_older_version_or_a_damaged_summary_remembers_one_night(sit
 
 def test_the_command_exits_1_with_one_line(tmp_path, cli, monkeypatch) -> None:
     monkeypatch.setattr("reports.nightly.compute.build", lambda payload: pytest.fail("built"))
-    site = tmp_path / "site"
-    site.mkdir()
-    (site / ".nightly-site").write_text("x")
-    (site / "summary.json").write_text(json.dumps({"history": {"id": "i", "nights": 7, "approvals": 1}}))
-    ran = cli("nightly", "ilr33-amber", "--site", site, "--quiet")
+    (tmp_path / ".nightly-site").write_text("x")
+    (tmp_path / "summary.json").write_text('{"history": {"id": "i", "nights": 7, "approvals": 1}}')
+    ran = cli("nightly", "ilr33-amber", "--site", tmp_path, "--quiet")
     assert (ran.status, ran.err.count("\n")) == (1, 1)
     assert "7 night(s) and 1 approval(s)" in ran.err
 
 
 def test_the_history_of_an_earlier_version_is_refused_and_left(site) -> None:
-    (state(site) / INDEX).rename(state(site) / "history.sqlite")
+    earlier = (state(site) / INDEX).rename(state(site) / "history.sqlite")
     for begin in (lambda: night(site, 3.0), lambda: approved(site)):
         with pytest.raises(HistoryLost, match=r"earlier version.*--accept-lost-history"):
             begin()
     night(site, 3.0, AGAIN)
-    assert (state(site) / "history.sqlite").is_file()
+    assert earlier.is_file()
 
 
 def test_any_damage_is_told_or_harmless(site) -> None:

@@ -1,5 +1,6 @@
 """Records whose truth is known: simulated motions, written as a recorder would."""
 
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 
@@ -7,6 +8,8 @@ import numpy as np
 
 from actuator_lti.design import load_design, model
 from actuator_lti.design.asked import FrozenMap
+from analyses.estimation.fit import Fit
+from analyses.identification.verdict import Identified, Item
 from analyses.records.record import Record, RowCounts
 from nonlinear import Trajectory, commands, simulate
 from tests.changed import changed
@@ -56,6 +59,17 @@ def record_of(time: np.ndarray, name: str = "r", **signals: np.ndarray) -> Recor
     """A record in memory, signals in SI."""
     rows = RowCounts(rows_in=len(time), rows_out=len(time))
     return Record(name=name, time_s=time, signals=signals, units={}, counts=rows)
+
+
+def errors_off(fit: Fit, truth: Mapping[str, float]) -> float:
+    """By how many of its standard errors the value that is furthest off is; those that were found count."""
+    return max(abs(fit[name] - truth[name]) / fit.std(name) for name in truth if name in fit.names)
+
+
+def item_of(result: Identified, id: str) -> Item:
+    """The one item of an identification that has an id."""
+    (item,) = (one for one in result.items if one.id == id)
+    return item
 
 
 def write(path: Path, columns: Columns, mark: str = ",", fmt: str = "%.12g") -> Path:

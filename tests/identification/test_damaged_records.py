@@ -23,7 +23,16 @@ from analyses.records.record import Record
 from benchmarks.random_records import KINDS, VALUES, random_records
 from nonlinear import commands, simulate
 from tests.changed import changed
-from tests.identification.bench_records import NOISE_A, Columns, bare, motion, record_of, signals_of
+from tests.identification.bench_records import (
+    NOISE_A,
+    Columns,
+    bare,
+    errors_off,
+    item_of,
+    motion,
+    record_of,
+    signals_of,
+)
 
 BASE = load_design("ilr33-amber")
 TRUTH = {"friction.dry_torque": 3e-3, "friction.viscous": 4e-6, "motor.rotor_inertia": 1.3e-6}
@@ -157,7 +166,7 @@ def test_values_hang_on_the_torque_constant_as_stated(signals, held, columns) ->
     settings, record = Settings(fix=HELD[held]), _record(columns, signals)
     result = identify_bench(BASE, [record], settings=settings)
     kept = result.model.fixed["torque_constant"]
-    (item,) = (one for one in result.items if one.id == "kept-torque_constant")
+    item = item_of(result, "kept-torque_constant")
     assert item.passed is None
     assert ("+10 % of every value" in item.reason) == (held == "nothing")
     assert "at kM = 0.0059 N m/A" in result.text
@@ -208,8 +217,7 @@ def test_a_filtered_current_tells_no_inductance(columns: Columns) -> None:
     result = identify_bench(BASE, [_record(filtered, WHOLE)], settings=Settings(electrical=True))
     assert "inductance" not in result.electrical.names
     assert result.design.motor.inductance_H == BASE.motor.inductance_H
-    (item,) = (one for one in result.items if one.id == "lag")
-    assert item.passed is None
+    assert item_of(result, "lag").passed is None
 
 
 def test_clipped_rows_count_in_no_check(columns: Columns) -> None:
@@ -250,12 +258,12 @@ def test_steps_of_a_command_act_between_the_rows_and_a_wrong_clock_is_seen_in_th
         assert result.passed
         assert items["following-r"].value < 1e-3
         assert items["written-r"].value < 0.02
-        assert abs(result.model["inertia"] - design.inertia_kgm2) < 2.5 * result.model.std("inertia")
+        assert errors_off(result.model, {"inertia": design.inertia_kgm2}) < 2.5
     for clock in (0.95, 1.05):
         time = clock * 1e-3 * np.arange(len(columns["current"]))
-        items = {item.id: item for item in identify_bench(design, [record_of(time, **columns)]).items}
-        assert items["following-r"].passed is False
-        assert "clock" in items["following-r"].reason
+        item = item_of(identify_bench(design, [record_of(time, **columns)]), "following-r")
+        assert item.passed is False
+        assert "clock" in item.reason
 
 
 SLOW = {
@@ -292,7 +300,7 @@ def test_a_constant_that_the_voltage_contradicts_is_said_or_found(electrical: bo
     record = _record(columns, WHOLE)
     result = identify_bench(with_values(BASE, OFF), [record], settings=Settings(electrical=electrical))
     model = result.model
-    assert all(abs(model[n] - value) < 2.0 * model.std(n) for n, value in WANTED.items())
+    assert errors_off(model, WANTED) < 2.0
     kept = {one.id: one for one in result.items}.get("kept-torque_constant")
     assert (kept is None) == electrical
     if kept is not None:
@@ -375,7 +383,7 @@ def test_a_load_friction_of_another_size_fails(factor: float, columns: Columns) 
     wrong = with_values(DRIVE, {"friction.load_coefficient": factor * DRIVE.friction.load_coefficient})
     result = identify_bench(wrong, [_record(columns), second])
     assert not result.passed
-    reason = next(item.reason for item in result.items if item.id == "size")
+    reason = item_of(result, "size").reason
     assert "Load friction is" in reason
     assert ("times the design's: factor 1000" in reason) == (factor < 1.0)
 
@@ -394,14 +402,13 @@ def test_a_constant_force_beside_the_one_stated_is_said(added_N: float, emps_fil
 def test_what_is_neither_met_nor_failed_says_why(columns: Columns) -> None:
     """50 mA of a current sensor: kM times that, neither met nor failed."""
     result = identify_bench(BASE, [_record({**columns, "current": columns["current"] + 0.05})])
-    (item,) = (one for one in result.items if one.id == "offset")
+    item = item_of(result, "offset")
     assert item.passed is None
     assert float(item.reason.partition(" ")[0]) == pytest.approx(5.9e-3 * 0.05, rel=0.03)
     assert not any(one.id == "offset" for one in identify_bench(BASE, [_record(columns)]).items)
     # a load friction 1 000 times too large, over a record without a load
     wrong = with_values(DRIVE, {"friction.load_coefficient": 1e3 * DRIVE.friction.load_coefficient})
-    kept = {one.id: one for one in identify_bench(wrong, [_record(columns)]).items}
-    item = kept["kept-load_coefficient"]
+    item = item_of(identify_bench(wrong, [_record(columns)]), "kept-load_coefficient")
     assert item.passed is None
     assert item.reason == "is not excited at all: the design's value kept"
 
@@ -418,9 +425,7 @@ def test_no_lag_is_found_where_the_drive_hardly_moves(amplitude, signals) -> Non
     result = identify_bench(BASE, [_record(signals_of(run, 1), signals)])
     assert "later" not in _said(result)
     assert "earlier" not in _said(result)
-    model, truth = result.model, WANTED
-    found = [name for name in truth if name in model.names]
-    assert not result.passed or all(abs(model[n] - truth[n]) < 3.5 * model.std(n) for n in found)
+    assert not result.passed or errors_off(result.model, WANTED) < 3.5
 
 
 @pytest.mark.parametrize("kind", [KINDS[0], KINDS[3]])

@@ -15,7 +15,7 @@ from analyses.identification.bench import BenchResult, identify_bench
 from analyses.records.holds import hold_of
 from analyses.records.record import Record
 from nonlinear import commands, simulate
-from tests.identification.bench_records import record_of
+from tests.identification.bench_records import errors_off, record_of
 from tests.identification.test_voltage_equation import RATIO, TEXT
 
 TICK_S, EVERY, STEPS = 1e-4, 10, 4  # the voltage acts half a tick after its sample
@@ -69,13 +69,12 @@ def _driven(command: np.ndarray, noise: np.ndarray) -> np.ndarray:
     return rows
 
 
-def _record(
-    hold: int, noise: float, seed: int, rows: int = 4000, every: float = EVERY, late: int = 0
-) -> Record:
+def _record(hold: int, noise: float, seed: int, every: float = EVERY, late: int = 0) -> Record:
     """A row of every tenth tick; noise in the loops, in shares of 600 rad/s and 150 mA.
 
     ``every``: ticks from row to row, in quarters; ``late``: quarters of a tick before the first.
     """
+    rows = 4000
     rng, time = np.random.default_rng(seed), np.arange(int(rows * every) + 1) * TICK_S
     waves = [(4.4, 5.1, 3.5), (8.8, 5.1, 3.5), (40.4, 0.5, 3.5), (48.4, 2.75, 3.5)]
     command = sum(size * (np.sin(rate * time + at) - np.sin(at)) for rate, at, size in waves) / RATIO
@@ -83,24 +82,17 @@ def _record(
     on = noise * rng.standard_normal((len(time), 2)) * [600.0, 0.15]
     at = late + int(every * STEPS) * np.arange(rows)
     speed, current, voltage, angle = _driven(RATIO * command, on)[at].T
-    signals = {
-        "reference": command[at // STEPS],
-        "angle": angle,
-        "speed": speed,
-        "current": current,
-        "voltage": voltage,
-    }
-    return record_of(TICK_S * every * np.arange(rows), "held", **signals)
+    motion = {"reference": command[at // STEPS], "angle": angle, "speed": speed}
+    return record_of(TICK_S * every * np.arange(rows), "held", **motion, current=current, voltage=voltage)
 
 
-def _identified(record: Record) -> BenchResult:
-    return identify_bench(_design(), [record], settings=Settings(electrical=True))
-
-
-def _off(result: BenchResult) -> dict[str, float]:
-    """By how many of its standard errors each value is off."""
-    fits = {name: fit for fit in (result.electrical, result.model) for name in fit.names if name in TRUTH}
-    return {name: (fit[name] - TRUTH[name]) / fit.std(name) for name, fit in fits.items()}
+def _is_found(result: BenchResult, near: float) -> None:
+    """All within 3.5 of their standard errors, and those of R, kE and J small beside the values."""
+    assert result.passed
+    for fit in (result.electrical, result.model):
+        assert errors_off(fit, TRUTH) < 3.5
+        for name in {"resistance", "back_emf", "inertia"} & set(fit.names):
+            assert fit.std(name) < near * TRUTH[name]
 
 
 @pytest.mark.parametrize("noise", [0.02, 0.03])
@@ -109,13 +101,9 @@ def test_noise_in_the_loops_leaves_the_motor_within_its_intervals(noise: float) 
 
     Resistance was off by 10 %, 5 standard errors, and nothing said so.
     """
-    result = _identified(_record(10, noise, 1))
-    assert result.passed
+    result = identify_bench(_design(), [_record(10, noise, 1)], settings=Settings(electrical=True))
     assert result.model.records[0].used["reference"] == "command of the simulated drive, held between samples"
-    assert max(map(abs, _off(result).values())) < 3.5
-    for fit in (result.electrical, result.model):
-        for name in {"resistance", "back_emf", "inertia"} & set(fit.names):
-            assert fit.std(name) < 0.04 * TRUTH[name]
+    _is_found(result, 0.04)
 
 
 @pytest.mark.parametrize(
@@ -127,12 +115,7 @@ def test_a_hold_of_no_whole_rows_is_told_by_the_rows_that_show_its_jumps(
     """Rows of 10 ticks under a hold of 13; of 3.25 ticks, between the ticks; and of a tick 0.03 % off."""
     record = _record(hold, 0.01, 1, every=every, late=late)
     design = with_values(_design(), {"control.period": TICK_S / clock})
-    result = identify_bench(design, [record], settings=Settings(electrical=True))
-    assert result.passed
-    assert max(map(abs, _off(result).values())) < 3.5
-    for fit in (result.electrical, result.model):
-        for name in {"resistance", "back_emf", "inertia"} & set(fit.names):
-            assert fit.std(name) < 0.02 * TRUTH[name]
+    _is_found(identify_bench(design, [record], settings=Settings(electrical=True)), 0.02)
 
 
 @pytest.mark.parametrize("seed", range(40))
@@ -175,5 +158,5 @@ def test_a_run_is_known_between_its_ticks() -> None:
     seen = signals_at(bare, run, other.time_s[part], 0.0)
     truth = {"angle": other.motor_angle_rad, "speed": other.motor_speed_rad_s, "current": other.current_A}
     for name, values in truth.items():
-        assert seen[name] == pytest.approx(values[part], abs=1e-6 * np.ptp(values)), name
+        assert seen[name] == pytest.approx(values[part], abs=1e-11 * np.ptp(values)), name
     assert np.array_equal(seen["voltage"], np.repeat(volts[1:], coarse)[: len(seen["voltage"])])

@@ -217,15 +217,10 @@ VALUES = ("inertia", "viscous", "dry", "offset")
 def _measured(plan: Plan, seed: int) -> tuple[dict[str, float], Record]:
     """A drive of other inertia and friction, driven by the plan; truth and record."""
     rng = np.random.default_rng([30, seed])
-    friction = BASE.friction
-    drive = with_values(
-        BASE,
-        {
-            "motor.rotor_inertia": BASE.motor.rotor_inertia_kgm2 * rng.uniform(0.7, 1.4),
-            "friction.dry_torque": friction.dry_torque_Nm * rng.uniform(0.6, 1.5),
-            "friction.viscous": friction.viscous_Nms_rad * rng.uniform(0.6, 1.5),
-        },
-    )
+    ranges = {"motor.rotor_inertia": (0.7, 1.4)}
+    ranges |= dict.fromkeys(("friction.dry_torque", "friction.viscous"), (0.6, 1.5))
+    shares = {key: parameter_value(BASE, key) * rng.uniform(*ends) for key, ends in ranges.items()}
+    drive = with_values(BASE, shares)
     time = np.arange(0.0, plan.time_s[-1], drive.controller.period_s)
     smooth = commands.sampled(time, CubicSpline(plan.time_s, plan.command)(time))
     run = simulate(drive, smooth, float(time[-1]), record_every=10)
@@ -233,8 +228,7 @@ def _measured(plan: Plan, seed: int) -> tuple[dict[str, float], Record]:
     current = run.current_A + NOISE_A * rng.standard_normal(len(run.time_s))
     record = record_of(run.time_s, reference=run.reference_rad, angle=run.motor_angle_rad, current=current)
     values = (drive.inertia_kgm2, drive.friction.viscous_Nms_rad, drive.friction.dry_torque_Nm, 0.0)
-    truth = dict(zip(VALUES, values, strict=True))
-    return truth, record
+    return dict(zip(VALUES, values, strict=True)), record
 
 
 def test_what_was_promised_is_kept_on_twenty_drives_and_motions_keep_off_the_limits() -> None:

@@ -12,7 +12,7 @@ from analyses.identification.bench import BenchResult, identify_bench
 from analyses.identification.run_down import decay_of, switched_off
 from analyses.records.record import Record
 from reports.sections.identify_records import section
-from tests.identification.bench_records import record_of
+from tests.identification.bench_records import errors_off, item_of, record_of
 from tests.identification.test_voltage_equation import TEXT
 from tests.refusals import refused
 
@@ -94,8 +94,7 @@ def test_both_directions_tell_the_offset() -> None:
     model = result.model
     assert model.names == ("viscous", "dry", "offset")
     assert section(result)["blocks"]  # no table of records fitted alone: of a run-down there is none
-    for name, truth in (("viscous", VISCOUS), ("dry", DRY), ("offset", offset)):
-        assert abs(model[name] - truth) < 3.0 * model.std(name)
+    assert errors_off(model, {"viscous": VISCOUS, "dry": DRY, "offset": offset}) < 3.0
 
 
 def test_a_map_is_refused_and_a_second_run_down_is_held_against_the_design() -> None:
@@ -120,8 +119,7 @@ def test_a_decay_of_another_law_is_not_proven(more: float) -> None:
     seen = np.array(rows) + 0.3 * np.random.default_rng(4).standard_normal(len(rows))
     time = PERIOD_S * np.arange(len(rows))
     result = _identified(record_of(time, "bent", speed=seen, current=np.zeros(len(rows))))
-    (law,) = (item for item in result.items if item.id == "law")
-    assert law.passed is (None if more else True)
+    assert item_of(result, "law").passed is (None if more else True)
 
 
 @pytest.mark.parametrize("by", ["speed", "angle"])

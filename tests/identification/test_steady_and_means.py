@@ -108,8 +108,10 @@ def _pair(offset: float, rate: float, noise: float = 0.01) -> tuple[Record, Reco
     return record_of(first, "drive", speed=speed), record_of(second, "sensor", torque=torque)
 
 
-def _join(first: Record, second: Record, **asked: object) -> tuple[Record, ClockJoin]:
-    join = clock_join(first, second, first_signal="speed", second_signal="torque", **asked)
+def _join(
+    first: Record, second: Record, method: str = "correlation", offset_s: float | None = None
+) -> tuple[Record, ClockJoin]:
+    join = clock_join(first, second, Join(method=method), offset_s)
     return joined_by(first, second, join), join
 
 

@@ -13,7 +13,7 @@ from analyses.identification import two_mass
 from analyses.identification.frequency_bench import identify_frequency
 from analyses.records.record import Record
 from tests.changed import changed
-from tests.identification.bench_records import record_of, two_mass_design
+from tests.identification.bench_records import item_of, record_of, two_mass_design
 from tests.refusals import refused
 
 TRUTH = dict(zip(two_mass.NAMES, (2e-5, 2e-3, 400.0, 0.02, 1e-5, 1e-3), strict=True))
@@ -139,7 +139,7 @@ def test_what_the_design_alone_tells_is_said_with_what_it_moves() -> None:
     assert "load_coefficient" not in plain.fit.fixed
     design = replace(_design(), friction=replace(_design().friction, load_coefficient=0.005))
     result = identify_frequency(design, _record(5))
-    (item,) = (one for one in result.items if one.id == "kept-load_coefficient")
+    item = item_of(result, "kept-load_coefficient")
     assert item.passed is None
     assert "of load_inertia, stiffness, damping, load_viscous" in item.reason
     assert result.fit["stiffness"] * (1.0 + 0.005 * N) == pytest.approx(plain.fit["stiffness"], rel=1e-4)

@@ -11,12 +11,13 @@ from analyses.identification.asked import Settings
 from analyses.identification.bench import BenchResult, identify_bench
 from analyses.identification.own_bias import in_counts
 from analyses.records.record import Record
-from tests.identification.bench_records import record_of
+from tests.identification.bench_records import errors_off, record_of
 from tests.refusals import refused
 
 OHM, HENRY, BACK, RATIO = 0.6, 3e-4, 0.05, 50.0
 INERTIA, DRY, VISCOUS = 6e-5, 0.012, 4e-5
 TICK_S, STEPS = 1e-4, 4
+MOTOR = {"resistance": OHM, "back_emf": BACK, "inductance": HENRY}
 TEXT = """
 [design]
 name = "mid"
@@ -141,14 +142,11 @@ def _identified(record: Record, **changes: float) -> BenchResult:
 @pytest.mark.parametrize("every", [1, 5, 10])
 def test_rows_thinned_out_tell_the_motor_within_their_intervals(ticks: Record, every: int) -> None:
     """The voltage at a tenth of the ticks is not its mean between them: kE was off by ten standard errors."""
-    result = _identified(
-        _every(ticks, every), back_emf_constant=0.047, torque_constant=0.047, resistance=0.55
-    )
-    fit, truth = result.electrical, {"resistance": OHM, "back_emf": BACK, "inductance": HENRY}
-    for name in truth.keys() & set(fit.names):
-        assert abs(fit[name] - truth[name]) < 3.5 * fit.std(name), name
-    assert fit["back_emf"] == pytest.approx(BACK, rel=1e-3)
-    assert abs(result.model["inertia"] - INERTIA) < 3.5 * result.model.std("inertia")
+    off = {"back_emf_constant": 0.047, "torque_constant": 0.047, "resistance": 0.55}
+    result = _identified(_every(ticks, every), **off)
+    assert errors_off(result.electrical, MOTOR) < 3.5
+    assert result.electrical["back_emf"] == pytest.approx(BACK, rel=1e-3)
+    assert errors_off(result.model, {"inertia": INERTIA}) < 3.5
     assert result.passed
 
 
@@ -181,9 +179,7 @@ def test_a_held_command_is_told_by_the_simulated_drive(form, dry, monkeypatch: p
     sides = [""] if form == "symmetric" else ["_forward", "_reverse"]
     motion = {"inertia": (INERTIA, 1e-3), **{name + side: laws[name] for name in laws for side in sides}}
     for fit, truth in ((result.electrical, motor), (result.model, motion)):
-        assert {n: fit[n] for n in truth} == {
-            n: pytest.approx(one, rel=rel) for n, (one, rel) in truth.items()
-        }
+        assert all(fit[n] == pytest.approx(one, rel=rel) for n, (one, rel) in truth.items()), fit
     assert result.model.records[0].used["reference"] == "command of the simulated drive, held between samples"
     assert result.passed
 
@@ -193,9 +189,7 @@ def test_noise_of_the_current_does_not_make_the_inductance_small(ticks: Record) 
     record, rng = _every(ticks, 1), np.random.default_rng(5)
     noisy = record["current"] + 0.1 * rng.standard_normal(len(record))
     fit = _identified(record_of(record.time_s, "noisy", **{**record.signals, "current": noisy})).electrical
-    truth = {"resistance": OHM, "back_emf": BACK, "inductance": HENRY}
-    for name in truth.keys() & set(fit.names):
-        assert abs(fit[name] - truth[name]) < 3.5 * fit.std(name), name
+    assert errors_off(fit, MOTOR) < 3.5
 
 
 def test_a_voltage_that_one_row_misses_is_in_the_intervals(ticks: Record) -> None:
@@ -206,7 +200,7 @@ def test_a_voltage_that_one_row_misses_is_in_the_intervals(ticks: Record) -> Non
     noise = 1e-3 * rng.standard_normal(len(record))
     hit = {**record.signals, "voltage": record["voltage"] + off * np.sign(rng.normal(size=len(off))) + noise}
     fit = _identified(record_of(record.time_s, "hit", **hit)).electrical
-    assert abs(fit["back_emf"] - BACK) < 3.5 * fit.std("back_emf")
+    assert errors_off(fit, {"back_emf": BACK}) < 3.5
 
 
 @pytest.mark.parametrize("counts", [256, 1024])

@@ -69,11 +69,8 @@ def random_law(
     known = [name for name in words if not lacking.get(name)]
     inputs = [name for name in known if rng.random() < 0.6]
     inputs += [] if {"command", "error"} & {*inputs} else ["error"]
-    n, m, size = (
-        int(rng.integers(0, 7)) if order is None else order,
-        len(inputs),
-        10.0 ** rng.uniform(-1, 0.3),
-    )
+    n, m = int(rng.integers(0, 7)) if order is None else order, len(inputs)
+    size = 10.0 ** rng.uniform(-1, 0.3)
     A = rng.standard_normal((n, n))
     A *= rng.uniform(0.2, 1.0) / max(np.abs(np.linalg.eigvals(A)), default=1.0)
     B, C, D = rng.standard_normal((n, m)), rng.standard_normal((1, n)), rng.standard_normal((1, m))

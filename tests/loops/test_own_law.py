@@ -14,13 +14,7 @@ from loop_designs import controlled
 from own_laws import PlainLaw, as_law, drawn, linear, stepped
 
 from actuator_lti import InputError, assemble_loops, load_design, stability_margins
-from actuator_lti.design import (
-    Design,
-    design_hash,
-    design_tree,
-    model,
-    warnings_of,
-)
+from actuator_lti.design import Design, design_hash, design_tree, model, warnings_of
 from actuator_lti.design.model import Command, Encoder, Limits, OutputEncoder
 from actuator_lti.loops.assemble import loops_at
 from nonlinear import Drive, Rows, State, commands, simulate, tangent

@@ -13,16 +13,10 @@ from actuator_lti.asked.verdict import Verdict
 from actuator_lti.design import model, read_design_text
 from actuator_lti.design.plant import reachable_speed
 from actuator_lti.drive.facts import breakaway_torque_Nm, capability
-from actuator_lti.drive.operating import (
-    Operating,
-    follows_angle,
-    holding_torque_Nm,
-    level,
-    straight,
-)
+from actuator_lti.drive.operating import Operating, follows_angle, holding_torque_Nm, level, straight
 from actuator_lti.drive.wiring import wire
 from actuator_lti.loops.assemble import loops_at
-from actuator_lti.loops.tick import TickProgram
+from actuator_lti.loops.tick import Tick, TickProgram
 from analyses.linear.loop_survey import operating_points
 from analyses.specification.requirements import evaluate_requirements
 from analyses.validation.places import Bench
@@ -68,6 +62,11 @@ def rotor(viscous=0.0, load_coefficient=0.0, path="back-drivable", damping=0.0) 
     return source_drive(J, 1.0, Ts, 10.0, gears=gears, load=load, friction=friction)
 
 
+def tick(design: model.Design, **at: object) -> Tick:
+    """The linear map of a tick of a drive without a controller."""
+    return TickProgram(wire(design, Operating(**at)), "voltage").tick(0)
+
+
 @each
 def test_a_rotor_swings_as_the_held_recursion_does(case: Case) -> None:
     """Without friction, its torque held over each tick."""
@@ -86,8 +85,7 @@ def test_small_swings_about_rest_have_the_frequency_of_the_slope(case: Case) -> 
     design, x = case.put(rotor()), A * case.order / J * Ts**2 / 2.0
     growth, turn = sqrt(1.0 + x), acos((1.0 - 0.5 * x) / sqrt(1.0 + x))
     assert turn / Ts == pytest.approx(sqrt(A * case.order / J), rel=1e-3)
-    at = Operating(angle_rad=case.stable / N)
-    poles = np.linalg.eigvals(TickProgram(wire(design, at), "voltage").tick(0).A)
+    poles = np.linalg.eigvals(tick(design, angle_rad=case.stable / N).A)
     assert np.max(np.abs(poles)) == pytest.approx(growth, rel=1e-12)
     assert np.max(np.angle(poles)) == pytest.approx(turn, rel=1e-9)
 
@@ -95,16 +93,14 @@ def test_small_swings_about_rest_have_the_frequency_of_the_slope(case: Case) -> 
 @each
 def test_at_every_instant_it_is_a_spring_that_keeps_its_energy(case: Case) -> None:
     """As in the motor: poles exp(+-j omega Ts), omega = sqrt(A Z/J)."""
-    at = Operating(angle_rad=case.stable / N, torques_at_once=True)
-    poles = np.linalg.eigvals(TickProgram(wire(case.put(rotor()), at), "voltage").tick(0).A)
+    poles = np.linalg.eigvals(tick(case.put(rotor()), angle_rad=case.stable / N, torques_at_once=True).A)
     assert np.abs(poles) == pytest.approx(1.0, abs=1e-12)
     assert np.max(np.angle(poles)) == pytest.approx(sqrt(A * case.order / J) * Ts, rel=1e-9)
 
 
 @each
 def test_a_drive_in_motion_feels_its_mean_which_is_none(case: Case) -> None:
-    at = Operating(speed_rad_s=40.0, angle_rad=0.3)
-    own, plain = (TickProgram(wire(one, at), "voltage").tick(0).A for one in (case.put(rotor()), rotor()))
+    own, plain = (tick(one, speed_rad_s=40.0, angle_rad=0.3).A for one in (case.put(rotor()), rotor()))
     assert np.array_equal(own, plain)
 
 
@@ -129,8 +125,7 @@ def test_it_is_asked_without_its_name(case: Case) -> None:
     assert follows_angle(design)
     for other in (plain, level(design), straight(design)):
         assert not follows_angle(other)
-    held = TickProgram(wire(design, Operating(torques_held=True)), "voltage").tick(0)
-    assert np.array_equal(held.A, TickProgram(wire(plain), "voltage").tick(0).A)
+    assert np.array_equal(tick(design, torques_held=True).A, tick(plain).A)
 
 
 @each
@@ -234,11 +229,11 @@ def test_a_drive_that_stands_stays_and_takes_the_slope_of_where_it_stands(case: 
         for volts in (0.0, 1e-4, -1e-4)
     ]
     assert np.max(np.abs(turned[0] - start.motor_angle_rad)) < 1e-9
-    tick = TickProgram(wire(free, motion.operating(free)), "voltage").tick(0)
-    x, expected = np.zeros(len(tick.A)), []
+    linear = TickProgram(wire(free, motion.operating(free)), "voltage").tick(0)
+    x, expected = np.zeros(len(linear.A)), []
     for _ in turned[0]:
-        expected.append(tick.signals["th"][: x.size] @ x)
-        x = tick.A @ x + tick.B[:, 0] * 1e-4
+        expected.append(linear.signals["th"][: x.size] @ x)
+        x = linear.A @ x + linear.B[:, 0] * 1e-4
     seen = 0.5 * (turned[1] - turned[2])
     assert np.max(np.abs(seen - expected)) < 1e-6 * np.max(np.abs(expected))
 
@@ -258,8 +253,9 @@ def test_a_rotor_coasts_to_the_held_recursion(viscous: float) -> None:
     w = run.motor_speed_rad_s
     assert w == pytest.approx(-80.0 * expected ** np.arange(w.size), rel=1e-12)
     assert run.load_Nm == pytest.approx(-D * w / N, rel=1e-12)
-    tick = TickProgram(wire(design), "voltage").tick(0)
-    assert np.sort(np.linalg.eigvals(tick.A).real) == pytest.approx(sorted([expected, 1.0]), rel=1e-12)
+    assert np.sort(np.linalg.eigvals(tick(design).A).real) == pytest.approx(
+        sorted([expected, 1.0]), rel=1e-12
+    )
 
 
 def test_a_self_locking_path_feels_it_as_friction_alone() -> None:

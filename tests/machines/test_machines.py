@@ -39,14 +39,8 @@ def facts(kind: str | None) -> dict[str, Any]:
     """What the script prints on a machine of a kind; ``None``: as this machine is."""
     environment = {name: value for name, value in os.environ.items() if name not in _ASKED}
     environment |= kinds()[kind] if kind else {"OPENBLAS_NUM_THREADS": "1"}
-    done = subprocess.run(
-        [sys.executable, "-W", "error", str(SCRIPT)],
-        input=loops(),
-        env=environment,
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+    command, kept = [sys.executable, "-W", "error", str(SCRIPT)], {"capture_output": True, "text": True}
+    done = subprocess.run(command, input=loops(), env=environment, check=False, **kept)
     assert done.returncode == 0, done.stderr[-2000:]
     assert not done.stderr
     result: dict[str, Any] = json.loads(done.stdout)

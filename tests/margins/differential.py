@@ -196,7 +196,7 @@ def delayed_forms(
         listed = replace(whole, phases=[p for p in whole.phases if p[0] < end])
         yield "delay_s within a band", facts(part), listed, far
     others = {
-        "series": partial(stability_margins, DelaySystem.from_system(loop) * DelaySystem.delay(delay_s)),
+        "series": partial(stability_margins, DelaySystem.from_system(loop) * DelaySystem.delay(delay_s))
     }
     if rng.random() < CERTIFIED_LATE:
         others["certified"] = partial(stability_margins, loop, delay_s=delay_s, certify=True)

@@ -96,12 +96,8 @@ def orders_1_to_25(rng: np.random.Generator) -> Loop:
 
 def hardly_damped(rng: np.random.Generator) -> Loop:
     n = int(rng.integers(2, 9))
-    return scaled(
-        rng,
-        roots_of(rng, int(rng.integers(0, n)), 2.0, -6.0),
-        roots_of(rng, n, 2.0, -6.0),
-        rng.random() < 0.3,
-    )
+    zeros, poles = (roots_of(rng, count, 2.0, -6.0) for count in (int(rng.integers(0, n)), n))
+    return scaled(rng, zeros, poles, rng.random() < 0.3)
 
 
 def clusters_and_near_cancellations(rng: np.random.Generator) -> Loop:

@@ -220,8 +220,4 @@ def test_a_delay_that_is_none_is_refused_in_one_line(system: str, delay_s: Any) 
         partial(stability_margins, given),
         partial(unwrapped_phase_deg, given, [1.0]),
     ):
-        refused(
-            asked,
-            delay_s=delay_s,
-            match=r"^delay_s = .*: must be finite and not negative, in s$",
-        )
+        refused(asked, delay_s=delay_s, match=r"^delay_s = .*: must be finite and not negative, in s$")

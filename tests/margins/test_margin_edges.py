@@ -6,6 +6,7 @@ import control
 import mpmath
 import numpy as np
 import pytest
+from margin_families import orders_1_to_25
 from margin_truth import difference, towards_the_border, truth_of
 
 from actuator_lti import load_design
@@ -244,6 +245,25 @@ def test_the_smallest_distance_is_found_at_a_resonance_that_few_places_show() ->
     assert bound == pytest.approx(1.814e-3, rel=1e-3)
     assert 0.99 * bound < m.modulus_margin <= bound  # a resonance passes -1 as a straight line
     assert m.modulus_frequency_rad_s == pytest.approx(nearest.frequency_rad_s, rel=1e-6)
+
+
+def test_the_smallest_distance_is_that_of_the_loop_where_its_factors_are_not_quite_the_loop() -> None:
+    """Order 3, of zeros that matrices place to 1e-4: the modulus margin was 2.6e-7 above |1 + L| near by."""
+    loop = orders_1_to_25(np.random.default_rng([3232, 500]))
+    for sampled in (loop, control.c2d(loop, 0.01)):
+        m = stability_margins(sampled)
+        assert m.evidence == "checked"
+        for place, value, distance in (
+            (m.modulus_frequency_rad_s, m.modulus_margin, lambda L: np.abs(1.0 + L)),
+            (
+                m.disk_margin.frequency_rad_s,
+                m.disk_margin.alpha,
+                lambda L: 2.0 * np.abs((1.0 + L) / (1.0 - L)),
+            ),
+        ):
+            w = place * (1.0 + np.linspace(-1e-4, 1e-4, 4001))
+            L = sampled(np.exp(0.01j * w) if sampled.dt else 1j * w)
+            assert value == pytest.approx(distance(L).min(), rel=1e-10)
 
 
 @pytest.mark.parametrize("seed", [*range(10), 605, 717, 962, 1135])

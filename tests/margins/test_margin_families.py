@@ -10,12 +10,7 @@ from collections.abc import Iterator
 import control
 import numpy as np
 import pytest
-from margin_families import (
-    PERIOD_S,
-    integrators_and_whole_samples,
-    near_the_border,
-    over_twelve_decades,
-)
+from margin_families import PERIOD_S, integrators_and_whole_samples, near_the_border, over_twelve_decades
 from margin_truth import ULP, behind_delay, difference, towards_the_border, truth_of
 
 from actuator_lti.margins import StabilityMargins, stability_margins

@@ -31,28 +31,24 @@ INLINE = Fakes(workers=0)
 def fake_document(payload: Mapping[str, Any]) -> dict[str, Any]:
     """A small report: one requirement on ``margin`` (not proven where ``unknown``), a table of margins."""
     name, margin, limit = str(payload["name"]), float(payload["margin"]), float(payload.get("limit", 6.0))
-    unknown = bool(payload.get("unknown"))
     found = {"value": margin, "distance": margin - limit, "passed": margin >= limit}
-    if unknown:
+    if payload.get("unknown"):
         found = dict.fromkeys(found) | {"reason": "not determined"}
     if payload.get("unstable"):
         found = {"passed": False, "reason": "the position loop is unstable"}
     named = str(payload.get("requirement", "GM")), str(payload.get("label", "gain margin"))
     about = {"limit": limit, "comparison": "≥", "unit": "dB", "source": "test"}
     item = {**verdict(*named, **about, **found), "waiver": str(payload.get("waiver", ""))}
-    rows = [
-        {"loop": loop, "phase_margin": 40.0 + margin + k, "crossover": 100.0 * (k + 1)}
-        for k, loop in enumerate(["current", "velocity", str(payload.get("loop", "position"))])
-    ]
+    loops = ("current", "velocity", str(payload.get("loop", "position")))
+    rows = [(loop, 40.0 + margin + k, 100.0 * (k + 1)) for k, loop in enumerate(loops)]
     columns = [
         column("loop", "loop"),
         column("phase_margin", "phase margin", "deg", format="fix:1", better=1),
         column("crossover", "crossover", "rad/s", format="sig:4"),
     ]
-    margins = table("Margins", columns, rows)
     sections = [
         section("verdicts", "Requirements", [verdicts([item])], status=role(item)),
-        section("margins", "Margins", [margins], status=payload.get("part", "info")),
+        section("margins", "Margins", [table("Margins", columns, rows)], status=payload.get("part", "info")),
     ]
     design = {"name": name, "revision": str(payload.get("revision", "A"))}
     origin = {"version": "0", "commit": None, "time": None}

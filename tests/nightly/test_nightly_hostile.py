@@ -43,14 +43,11 @@ HOSTILE = (
 @pytest.fixture(scope="module")
 def hostile_site(tmp_path_factory):
     """Two nights of a study whose every text is hostile."""
-    site = tmp_path_factory.mktemp("hostile") / "site"
-    clock = Calendar()
+    site, clock, half = tmp_path_factory.mktemp("hostile") / "site", Calendar(), "half a sign \ud800"
+    texts = ("title", "label", "requirement", "loop", "revision")
     for margin in (10.0, 9.0):
-        half = "half a sign \ud800"
-        jobs = [
-            job(name, margin, **dict.fromkeys(("title", "label", "requirement", "loop", "revision"), words))
-            for name, words in [*zip(HOSTILE, HOSTILE, strict=True), ("surrogate", half)]
-        ]
+        named = {**{words: words for words in HOSTILE}, "surrogate": half}
+        jobs = [job(name, margin, **dict.fromkeys(texts, words)) for name, words in named.items()]
         jobs.append(job("raises", mode="raise", words=" ".join((*HOSTILE[:15], half))))
         made = study(*jobs, title="".join(HOSTILE[:5]))
         run_night(made, site, INLINE, code=CODE, clock=clock.next())
@@ -86,14 +83,12 @@ def test_junit_and_summary_name_every_design_no_cell_is_a_formula_and_no_line_a_
     suites = [s.get("name") for s in ElementTree.parse(hostile_site / "junit.xml").getroot()]
     assert len(suites) == len(HOSTILE) + 2
     assert {HOSTILE[0], "x" * 10_000} <= set(suites)
-    names = {d["name"] for d in json.loads((hostile_site / "summary.json").read_text())["designs"]}
-    assert set(HOSTILE) <= names
-    tables = list(hostile_site.glob("nights/*/*.csv"))
-    assert tables
-    for path in tables:
-        for row in csv.reader(io.StringIO(path.read_text(encoding="utf-8"), newline="")):
-            assert len(row) == 4
-            assert not row[0].lstrip().startswith(("=", "+", "-", "@", "|")), row[0][:60]
+    designs = json.loads((hostile_site / "summary.json").read_text())["designs"]
+    assert set(HOSTILE) <= {one["name"] for one in designs}
+    tables = (path.read_text(encoding="utf-8") for path in hostile_site.glob("nights/*/*.csv"))
+    rows = [row for text in tables for row in csv.reader(io.StringIO(text, newline=""))]
+    assert {len(row) for row in rows} == {4}
+    assert [row for row in rows if row[0].lstrip().startswith(("=", "+", "-", "@", "|"))] == []
     text = (hostile_site / "summary.md").read_text(encoding="utf-8")
     assert not [words for words in ("<script", "<img", "](http") if words in text]
     assert all(line.count("|") in (0, 6) or "\\|" in line for line in text.splitlines())

@@ -31,8 +31,8 @@ def test_every_design_gets_its_own_end_and_the_page_says_why(tmp_path) -> None:
     how = {"code": CODE, "clock": Calendar(), "progress": lambda *pair: seen.append(pair)}
     night = run_night(made, site, settings, **how)
     assert workers_left() == []
-    took_s = {d.name: d.result.seconds for d in night.designs}
-    assert 6.0 <= took_s["never ends"] < 15.0
+    (took_s,) = (d.result.seconds for d in night.designs if d.name == "never ends")
+    assert 6.0 <= took_s < 15.0
     ends = {"raises": "error", "never ends": "timeout", "is killed": "crash", "leaves": "crash"}
     good = dict.fromkeys(("first", *(f"good {k}" for k in range(4))), "pass")
     assert {d.name: d.result.status for d in night.designs} == {**ends, "fails": "fail", **good}
@@ -124,8 +124,7 @@ def test_a_killed_nightly_takes_its_workers_along_and_resumes(tmp_path) -> None:
     kept = len(list(cache.glob("*/*.entry"))) - 1
     jobs = [job(f"d{k}", log=str(log), pause=0.15) for k in range(8)]
     night = run_night(study(*jobs), site, INLINE, code=CODE)
-    cached = {d.name for d in night.designs if d.result.cached}
-    assert len(cached) == kept >= 3
+    assert sum(d.result.cached for d in night.designs) == kept >= 3
     assert night.interrupted
     assert "did not end" in check_whole(site).text
 
@@ -156,9 +155,9 @@ def test_nights_of_real_designs_their_approval_and_a_report_as_pdf(tmp_path, cli
     command = [Path(sys.executable).with_name("actuator-lti"), "nightly", *words]
     done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=300)
     assert done.returncode == 1, done.stderr
-    assert done.stdout.startswith("FAIL  night 1: 1 no result")
     said = " ".join(done.stdout.split())  # where a cell is wrapped depends on the length of the folder's name
-    assert all(words in said for words in ("no <b>motor</b>", "motor.resistance = ", "allowed: above 0"))
+    for words in ("FAIL night 1: 1 no result", "no <b>motor</b>", "motor.resistance = ", "allowed: above 0"):
+        assert words in said
     summary = json.loads((tmp_path / "site" / "summary.json").read_text())
     names = {"ctms-motor-position", "slower", "no <b>motor</b>", "Comparison of all variants"}
     assert {d["name"] for d in summary["designs"]} == names
@@ -172,8 +171,6 @@ def test_nights_of_real_designs_their_approval_and_a_report_as_pdf(tmp_path, cli
     report = next((tmp_path / "site" / "reports").glob("slower-*/*/report.json"))
     cli.text("pdf", report, "--out", tmp_path / "r.pdf")
     assert (tmp_path / "r.pdf").read_bytes().startswith(b"%PDF")
-    (tmp_path / "no.json").write_text("{}")
-    cli.refused("pdf", tmp_path / "no.json")
 
 
 @pytest.mark.parametrize(("table", "expected"), [

@@ -49,12 +49,11 @@ def test_cover_numbers_blocks_vectors_and_fonts_are_all_there() -> None:
     pieces = ["plain words", "Revision B", "0 of 1 requirements met, 1 not met", "not met", "d" * 64]
     signing = ["Prepared", "Checked", "Approved", "Signature", "Date", "Name", "2026-01-02T03:04:05"]
     assert [piece for piece in pieces + signing if piece not in cover] == []
-    count = len(plain.pages)
+    count, each = len(plain.pages), list(map(words_of, plain.pages))
     assert count >= 2
-    for number, page in enumerate(plain.pages, start=1):
-        assert f"Page {number} of {count}" in words_of(page)
+    assert [k for k, words in enumerate(each, 1) if f"Page {k} of {count}" not in words] == []
     assert not any(list(page.images) for page in plain.pages)
-    everything = " ".join(words_of(p) for p in plain.pages)
+    everything = " ".join(each)
     told = ("phase margin", "45.0", "velocity", "300.0", "folded", "1.5 V", "Contents", "second paragraph")
     assert [piece for piece in told if piece not in everything] == []
     fonts = [font for page in plain.pages for font in page["/Resources"].get("/Font", {}).values()]
@@ -68,11 +67,9 @@ def test_a_dozen_requirements_still_leave_room_to_sign_on_the_cover() -> None:
     met = {"value": 9.0, "limit": 6.0, "unit": "dB", "distance": 3.0, "passed": True, "source": "s"}
     items = [verdict(f"r{k}", f"requirement {k}", **met) for k in range(12)]
     blocks = [verdicts(items), verdicts(items[:2], what="checks"), verdicts(items[:2], what="odds")]
-    made = document(
-        title="A drive", subtitle="words " * 30, design={"name": "a", "revision": "B"}, provenance=ORIGIN,
-        sections=[section("verdicts", "Verdicts", blocks)],
-    )  # fmt: skip
-    cover = words_of(read(made).pages[0])
+    parts, design = [section("verdicts", "Verdicts", blocks)], {"name": "a", "revision": "B"}
+    about = {"title": "A drive", "subtitle": "words " * 30, "design": design, "provenance": ORIGIN}
+    cover = words_of(read(document(**about, sections=parts)).pages[0])
     assert all(words in cover for words in ("12 of 12 requirements met", "requirement 11", "Signature"))
 
 
@@ -82,8 +79,7 @@ def test_type_is_no_smaller_than_8_points_and_what_is_said_is_not_grey() -> None
     wide = table("Wide", [column(key, key) for key in keys], [dict.fromkeys(keys, 1.0)], note="says the note")
     item = verdict("r", "asked", value=1.0, limit=6.0, unit="dB", passed=False, reason="says the reason")
     blocks = [verdicts([item]), wide, text("says the text")]
-    colours, sizes = list[tuple[float, ...]](), list[float]()
-    told: dict[str, tuple[float, ...]] = {}
+    colours, sizes, told = [], [], {}
 
     def painted(operator: bytes, operands: list[float], _cm: object, _tm: object) -> None:
         if operator == b"scn":
@@ -99,9 +95,8 @@ def test_type_is_no_smaller_than_8_points_and_what_is_said_is_not_grey() -> None
     for page in read(made).pages:
         page.extract_text(visitor_operand_before=painted, visitor_text=written)
     assert min(sizes) >= 8.0
-    said = {told[f"says the {kind}"] for kind in ("note", "reason", "text")}
-    assert len(said) == 1
-    assert max(said.pop()) < 0.25
+    (colour,) = {told[f"says the {kind}"] for kind in ("note", "reason", "text")}
+    assert max(colour) < 0.25
 
 
 def test_the_same_document_is_typeset_the_same_and_its_file_written_whole_or_not_at_all(tmp_path) -> None:

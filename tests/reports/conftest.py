@@ -45,3 +45,11 @@ def opens(browser, once) -> Iterator[Callable[..., Any]]:
     for page in pages:
         page.context.close()
     assert trouble == []
+
+
+@pytest.fixture
+def page(opens) -> Any:
+    """The page of ilr33-amber, once it has followed."""
+    made = opens(AMBER)
+    made.done()
+    return made

@@ -4,6 +4,7 @@ import json
 import math
 from collections.abc import Callable
 from hashlib import sha256
+from itertools import product
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -181,11 +182,10 @@ def agree(ours: dict[str, dict[str, float]], loops: dict[str, Any], filtered: bo
 def same_figures(page: Page, design: Design, what: str = "") -> None:
     """Compare every figure of every loop with those of the linear form; an unstable loop's S has no peak."""
     theirs, ours = linear_figures(Population(design, {}, 1)), page.read()
-    for loop in theirs.loops:
-        for name in FIGURES:
-            wanted = float(theirs.quantity(name, loop)[0])
-            if math.isfinite(wanted):
-                assert ours[loop][name] == pytest.approx(wanted, rel=1e-9, abs=1e-9), (what, loop, name)
-            elif name == "sensitivity_peak" and not theirs.stable(loop)[0]:
-                assert math.isnan(wanted)
-                assert math.isnan(ours[loop][name])
+    for loop, name in product(theirs.loops, FIGURES):
+        wanted = float(theirs.quantity(name, loop)[0])
+        if math.isfinite(wanted):
+            assert ours[loop][name] == pytest.approx(wanted, rel=1e-9, abs=1e-9), (what, loop, name)
+        elif name == "sensitivity_peak" and not theirs.stable(loop)[0]:
+            assert math.isnan(wanted)
+            assert math.isnan(ours[loop][name])

@@ -2,6 +2,7 @@
 
 import os
 from pathlib import Path
+from unittest.mock import Mock
 
 import pytest
 
@@ -13,8 +14,7 @@ def test_a_file_replaces_the_old_one_and_leaves_nothing_beside_it(tmp_path) -> N
     target, plain = tmp_path / "new" / "a.txt", tmp_path / "plain"
     atomic.write_text(target, "one")
     atomic.write_text(target, "two µ")
-    assert target.read_text(encoding="utf-8") == "two µ"
-    assert os.listdir(target.parent) == ["a.txt"]
+    assert (target.read_text(encoding="utf-8"), os.listdir(target.parent)) == ("two µ", ["a.txt"])
     plain.write_text("x")
     assert target.stat().st_mode == plain.stat().st_mode  # the rights that any new file gets
 
@@ -26,22 +26,17 @@ def test_files_written_together_stay_old_if_one_cannot_be_written_and_what_is_in
     both = {tmp_path / "a": b"new", tmp_path / "file" / "b": b"new"}
     refused(atomic.write_together, both, words="cannot write")
     assert ".part" not in refused(atomic.write_text, tmp_path / "taken", "x", words="taken: cannot write")
-    assert (tmp_path / "a").read_text() == "old"
-    assert sorted(os.listdir(tmp_path)) == ["a", "file", "taken"]
+    assert ((tmp_path / "a").read_text(), sorted(os.listdir(tmp_path))) == ("old", ["a", "file", "taken"])
 
 
 def test_an_interrupt_while_writing_leaves_the_old_file(tmp_path, monkeypatch) -> None:
     target = tmp_path / "a"
     target.write_text("old")
 
-    def interrupted(_handle: int) -> None:
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr(atomic.os, "fsync", interrupted)
+    monkeypatch.setattr(atomic.os, "fsync", Mock(side_effect=KeyboardInterrupt))
     with pytest.raises(KeyboardInterrupt):
         atomic.write_text(target, "new")
-    assert target.read_text() == "old"
-    assert os.listdir(tmp_path) == ["a"]
+    assert (target.read_text(), os.listdir(tmp_path)) == ("old", ["a"])
 
 
 def test_all_is_on_the_disk_before_anything_is_in_its_place(tmp_path, monkeypatch) -> None:

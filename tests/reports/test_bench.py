@@ -36,8 +36,7 @@ def ask(page: Page, kind: str, **values: float) -> dict[str, float]:
 
 def last(page: Page) -> dict[str, float]:
     page.done()
-    found: dict[str, float] = json.loads(page.get_attribute(".hands-run", "data-last") or "{}")
-    return found
+    return json.loads(page.get_attribute(".hands-run", "data-last") or "{}")
 
 
 def agree(found: dict[str, float], command: Command, load_Nm: float = 0.0, **changes: float) -> None:
@@ -47,8 +46,8 @@ def agree(found: dict[str, float], command: Command, load_Nm: float = 0.0, **cha
     output = math.degrees(run.output_angle_rad[ticks - 1])
     assert found["output"] == pytest.approx(output, rel=1e-9, abs=1e-12)
     traces = {"speed": run.motor_speed_rad_s, "current": run.current_A, "voltage": run.voltage_V}
-    ends = {name: trace[ticks - 1] for name, trace in traces.items()}
-    assert {name: found[name] for name in ends} == pytest.approx(ends, rel=1e-7, abs=1e-9)
+    for name, trace in traces.items():
+        assert found[name] == pytest.approx(trace[ticks - 1], rel=1e-7, abs=1e-9), name
 
 
 def test_step_sine_and_ramp_are_those_of_the_simulator(page: Page) -> None:
@@ -105,10 +104,8 @@ def test_a_limit_that_acts_is_shaded_where_it_acts(page: Page) -> None:
     ticks = int(ask(page, "step", Size=8.0, Duration=0.6)["ticks"])
     run = simulate(AMBER, step(math.radians(8.0)), duration_s=ticks * AMBER.controller.period_s)
     acting = run.limit_active("speed").mean()
-    boxes = page.eval_on_selector_all(
-        '[data-chart="run"] .panel:nth-of-type(2) .cells rect',
-        "all => all.filter(r => r.textContent === 'speed limit').map(r => +r.getAttribute('width'))",
-    )
+    script = "all => all.filter(r => r.textContent === 'speed limit').map(r => +r.getAttribute('width'))"
+    boxes = page.eval_on_selector_all('[data-chart="run"] .panel:nth-of-type(2) .cells rect', script)
     ends = page.locator('[data-chart="run"] .panel').nth(1).get_attribute("data-x")
     left, right = map(float, ends.split(" ")[3:])
     assert 0.1 < acting < 0.99
@@ -118,8 +115,7 @@ def test_a_limit_that_acts_is_shaded_where_it_acts(page: Page) -> None:
 
 def test_a_click_on_the_map_plays_that_sine(page: Page) -> None:
     ask(page, "step", Duration=0.0)
-    at = page.spot('[data-chart="border"] .plot', 0.35, 0.4)
-    page.settled(lambda: page.mouse.click(*at))
+    page.settled(lambda: page.mouse.click(*page.spot('[data-chart="border"] .plot', 0.35, 0.4)))
     assert page.input_value(".run-kind") == "sine"
     trial = page.evaluate(
         "() => Object.fromEntries([...document.querySelectorAll('.run-keys label')]"
@@ -150,8 +146,7 @@ def test_growth_of_an_unstable_drive_is_seen(page: Page) -> None:
     swings = []
     for path in page.locator('[data-chart="run"] .panel').first.locator(".curve").all()[-2:]:
         points = (path.get_attribute("d") or "")[1:].split("L")
-        late = [float(point.split(" ")[1]) for point in points[len(points) // 2 :]]
-        swings.append(max(late) - min(late))
+        swings.append(np.ptp([float(point.split(" ")[1]) for point in points[len(points) // 2 :]]))
     assert swings[1] > 5.0 > 10.0 * swings[0]  # as changed it goes on, as designed it rests
     page.does("reset")
     usual = ask(page, "step", Size=4.0, Duration=0.0)["ticks"]

@@ -56,8 +56,7 @@ def test_log_ticks_lie_inside_and_say_their_value(power: float, decades: float) 
     low, high = 10.0**power, 10.0 ** (power + decades)
     ticks = log_ticks(low, high)
     assert len(ticks) <= 9
-    for value, _ in ticks:
-        assert low * (1 - 1e-6) <= value <= high * (1 + 1e-6)
+    assert all(low * (1 - 1e-6) <= value <= high * (1 + 1e-6) for value, _ in ticks)
 
 
 @given(st.floats(0.01, 1e4), st.floats(1.5, 1e6), st.floats(0.0, 1.0), st.booleans(), st.booleans())
@@ -73,16 +72,14 @@ def test_an_axis_places_its_ends_and_what_lies_between(low, ratio, part, log, re
 def test_limits_follow_the_values_that_an_axis_has_a_place_for_whenever_its_kind_is_said(before) -> None:
     panel = Chart().panel()
     panel.curve([1.0, 1.0], [5.0, 5.0])
-    (x0, x1), (y0, y1) = panel.x.span(), panel.y.span()
-    assert x0 < 1.0 < x1
-    assert y0 < 5.0 < y1
+    for axis, value in ((panel.x, 1.0), (panel.y, 5.0)):
+        assert axis.span()[0] < value < axis.span()[1]
     panel = Chart().panel()
     panel.y.log = before
     panel.curve([1.0, 2.0, 3.0, 4.0], [0.0, -1.0, 10.0, 1000.0])
     panel.y.log = True
     low, high = panel.y.span()
-    assert 0.0 < low < 10.0
-    assert high > 1000.0
+    assert 0.0 < low < 10.0 < 1000.0 < high
     assert low * high == pytest.approx(1e4)
 
 
@@ -124,8 +121,7 @@ def test_equal_axes_have_equal_units() -> None:
     panel.y.limits(-1.0, 1.0)
     units = []
     for low, high, a, b in ends_of(page_svg(chart, "f", "")):
-        assert low <= -1.0
-        assert high >= 1.0
+        assert low <= -1.0 < 1.0 <= high
         units.append(abs(b - a) / (high - low))
     assert units[0] == pytest.approx(units[1], rel=1e-3)
 
@@ -139,31 +135,24 @@ def test_words_keep_off_curves_and_each_other_where_there_is_room(seed: int) -> 
     boxes = [room.near((float(x[k]), float(y[k])), (60.0, 26.0)) for k in (8, 20, 33)]
     dense_x = np.linspace(0.0, 400.0, 4000)
     dense_y = np.interp(dense_x, x, y)
-    for k, (x0, y0, x1, y1) in enumerate(boxes):
-        assert 0.0 <= x0 < x1 <= 400.0
-        assert 0.0 <= y0 < y1 <= 300.0
+    for x0, y0, x1, y1 in boxes:
+        assert (0.0 <= x0 < x1 <= 400.0, 0.0 <= y0 < y1 <= 300.0) == (True, True)
         assert not ((dense_x > x0) & (dense_x < x1) & (dense_y > y0) & (dense_y < y1)).any()
-        for a0, b0, a1, b1 in boxes[:k]:
-            assert x1 <= a0 or a1 <= x0 or y1 <= b0 or b1 <= y0
-
-
-def outlines(centre_deg: float) -> list[tuple[str, np.ndarray, np.ndarray]]:
-    panel = Chart().panel()
-    nichols_regions(panel, centre_deg, named=False)
-    kinds = {style.ORANGE: "S", style.PURPLE: "T", style.INK: "+"}
-    return [(kinds[item.look.colour], item.x, item.y) for item in panel.items]
+    for (x0, y0, x1, y1), (a0, b0, a1, b1) in itertools.combinations(boxes, 2):
+        assert x1 <= a0 or a1 <= x0 or y1 <= b0 or b1 <= y0
 
 
 @pytest.mark.parametrize("centre_deg", [-180.0, -540.0])
 def test_every_point_of_an_outline_has_that_peak(centre_deg: float) -> None:
-    magnitudes = {"S": lambda L: 1 / abs(1 + L), "T": lambda L: abs(L / (1 + L))}
-    made = outlines(centre_deg)
-    assert [kind for kind, _, _ in made] == ["+", "S", "T"]
+    panel = Chart().panel()
+    nichols_regions(panel, centre_deg, named=False)
+    _cross, *outlines = panel.items
+    assert [item.look.colour for item in panel.items] == [style.INK, style.ORANGE, style.PURPLE]
     assert critical_points(-700.0, 10.0) == [-540.0, -180.0, 180.0]  # odd half turns
-    for kind, x, y in made[1:]:
-        L = 10 ** (y / 20.0) * np.exp(1j * np.radians(x))
-        np.testing.assert_allclose(20 * np.log10(magnitudes[kind](L)), 6.0, atol=1e-9)
-        assert np.abs(np.diff(x)).max() < 60.0  # no jump of a turn
+    for one, size in zip(outlines, (lambda L: 1 / abs(1 + L), lambda L: abs(L / (1 + L))), strict=True):
+        L = 10 ** (one.y / 20.0) * np.exp(1j * np.radians(one.x))
+        np.testing.assert_allclose(20 * np.log10(size(L)), 6.0, atol=1e-9)
+        assert np.abs(np.diff(one.x)).max() < 60.0  # no jump of a turn
 
 
 def test_the_rise_is_marked_where_it_begins_and_ends() -> None:
@@ -187,10 +176,8 @@ def run() -> Trajectory:
 
 def test_a_limit_that_is_drawn_says_so(run: Trajectory) -> None:
     """A step of 20 deg takes speed, current and voltage to their limits."""
-    drawn = chart_of(run).columns[0].panels
-    limits = {
-        item.words: item.at for panel in drawn for item in panel.items if item.kind == "rule" and item.words
-    }
+    items = [item for panel in chart_of(run).columns[0].panels for item in panel.items]
+    limits = {item.words: item.at for item in items if item.kind == "rule" and item.words}
     expected = [run.limits[name].limit for name in ("speed", "current", "voltage")]
     assert limits == {f"limit ±{each:.4g}": each for each in expected}
 

@@ -6,6 +6,7 @@ import re
 import shlex
 import subprocess
 import sys
+from unittest.mock import Mock
 
 import pytest
 import typer
@@ -56,11 +57,8 @@ def test_a_report_with_validation_waits_for_no_library_that_it_does_not_use() ->
 def test_margins_in_json_and_nothing_else(cli) -> None:
     assert cli.text("--version").startswith("actuator-lti ")
     ran = cli("margins", "--json")
-    assert (ran.status, ran.err) == (0, "")
-    result = ran.data
-    assert result["passed"] is True
-    assert result["loops"]["velocity"]["phase_margin_deg"] == pytest.approx(73.70, abs=0.01)
-    assert len(result["requirements"]) == 12
+    assert (ran.status, ran.err, ran.data["passed"], len(ran.data["requirements"])) == (0, "", True, 12)
+    assert ran.data["loops"]["velocity"]["phase_margin_deg"] == pytest.approx(73.70, abs=0.01)
 
 
 @pytest.mark.parametrize("form", ["sampled", "continuous", "ideal"])
@@ -174,8 +172,7 @@ def test_bad_input_is_one_line_and_status_2_and_writes_nothing(arguments, words,
 def test_a_number_may_have_its_unit(given: tuple[str, str, str], cli) -> None:
     options = zip(("--frequency", "--share", "--cycle"), given, strict=True)
     told = cli.text("duty", "ilr33-amber", "--amplitude", "1 deg", *(word for one in options for word in one))
-    assert "±1 deg at 2 Hz" in told
-    assert "50 % of every 20 s" in told
+    assert ("±1 deg at 2 Hz" in told, "50 % of every 20 s" in told) == (True, True)
 
 
 def test_a_bad_file_is_named_and_nothing_is_written(tmp_path, cli) -> None:
@@ -192,19 +189,16 @@ def test_report_writes_both_files_and_gives_the_document(tmp_path, cli) -> None:
     assert told == json.loads((tmp_path / "report.json").read_text(encoding="utf-8"))
     assert sorted(os.listdir(tmp_path)) == ["report.html", "report.json"]
     said = cli.refused("report", "--include", tmp_path / "report.json", "--out", tmp_path / "again")
-    assert "report.json: --include: a whole report" in said
-    assert "allowed: what identify or correlate wrote" in said
+    assert re.search(
+        "report.json: --include: a whole report.*; allowed: what identify or correlate wrote", said
+    )
     assert not (tmp_path / "again").exists()
 
 
 def test_an_interrupted_command_says_so(monkeypatch, cli) -> None:
-    def interrupted() -> None:
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr("actuator_lti.design.load_design", lambda name: interrupted())
+    monkeypatch.setattr("actuator_lti.design.load_design", Mock(side_effect=KeyboardInterrupt))
     ran = cli("margins")
-    assert (ran.status, ran.err.count("\n")) == (130, 1)
-    assert "interrupted" in ran.err
+    assert (ran.status, ran.err.count("\n"), "interrupted" in ran.err) == (130, 1, True)
 
 
 @pytest.mark.parametrize("words", [["margins", "--json"], ["margins"]])
@@ -226,20 +220,15 @@ def test_progress_stays_off_where_nobody_looks(capsys) -> None:
 
 @pytest.mark.parametrize("command", ["report", "validate", "compare", "tune", "montecarlo"])
 def test_a_folder_that_cannot_be_is_refused_before_anything_is_computed(command, tmp_path, cli, monkeypatch):
-    def unwanted(*_: object) -> None:
-        raise AssertionError("the design was read before the folder was looked at")
-
-    monkeypatch.setattr("actuator_lti.design.load_design", unwanted)
-    (tmp_path / "file").write_text("mine")
-    for place in (tmp_path / "file", tmp_path / "file" / "inside"):
-        said = cli.refused(command, "ilr33-amber", "--out", place)
-        assert f"{tmp_path / 'file'}" in said
-        assert "is not a directory" in said
-    assert (tmp_path / "file").read_text() == "mine"
+    read, file = Mock(), tmp_path / "file"
+    monkeypatch.setattr("actuator_lti.design.load_design", read)
+    file.write_text("mine")
+    for place in (file, file / "inside"):
+        assert f"{file}: is not a directory" in cli.refused(command, "ilr33-amber", "--out", place)
+    assert (file.read_text(), read.called) == ("mine", False)
 
 
 def test_margins_say_what_is_suspicious_on_standard_error(cli) -> None:
     ran = cli("margins", "emps", "--json")
-    assert ran.status in (0, 1)
     assert ran.err.startswith("warning: emps: control.position.gain:")
     assert ran.data["design"]["name"] == "emps"

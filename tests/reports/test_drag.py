@@ -18,7 +18,7 @@ from tests.changed import changed
 SCALE = """([chart, k]) => {
     const svg = document.querySelector(`[data-chart="${chart}"] .plot`);
     const group = svg.querySelectorAll(".panel")[k];
-    const ends = (name) => [...group.querySelectorAll(name)].map((node) => node);
+    const ends = (name) => [...group.querySelectorAll(name)];
     const zoom = svg.getScreenCTM().a;
     const at = (node, key) => Number(node.getAttribute(key));
     const number = (node) => Number(node.textContent.replace("−", "-").replace("k", "e3").replace("M", "e6"));
@@ -62,8 +62,7 @@ def test_the_magnitude_is_dragged_by_decibels_and_undone_in_one_step(page: Page)
     by = decibels(page, -8.0)
     assert by > 3.0
     assert page.field("control.velocity.gain") == pytest.approx(0.12 * 10.0 ** (by / 20.0), rel=2e-3)
-    after = page.read()["velocity"]
-    assert after["gain_margin"] == pytest.approx(before["gain_margin"] - by, abs=0.02)
+    assert page.read()["velocity"]["gain_margin"] == pytest.approx(before["gain_margin"] - by, abs=0.02)
     page.click('[data-do="undo"]')
     page.wait_for_function("() => document.querySelector('[data-do=\"undo\"]').disabled")
     assert page.field("control.velocity.gain") == pytest.approx(0.12)
@@ -103,8 +102,7 @@ def test_the_nyquist_curve_is_dragged_outwards(page: Page) -> None:
         const at = new DOMPoint(zero(a), zero(b)).matrixTransform(svg.getScreenCTM());
         return [at.x, at.y]; }"""
     )
-    away = (x - origin[0], y - origin[1])
-    drag(page, (x, y), 0.4 * away[0], 0.4 * away[1])
+    drag(page, (x, y), 0.4 * (x - origin[0]), 0.4 * (y - origin[1]))
     assert page.field("control.velocity.gain") == pytest.approx(0.12 * 1.4, rel=2e-2)
 
 
@@ -120,13 +118,11 @@ def test_the_corner_and_the_notch_are_moved_by_their_handles(page: Page) -> None
     notch, width = name.removesuffix(".frequency"), name.replace(".frequency", ".width")
     first, wide = page.field(name), page.field(width)
     drag(page, middle(notch), 15.0, 0.0)
-    moved = page.field(name)
-    assert moved == pytest.approx(first * ratio, rel=5e-3)
+    assert (moved := page.field(name)) == pytest.approx(first * ratio, rel=5e-3)
     page.keyboard.down("Shift")
     drag(page, middle(notch), 15.0, 0.0)
     page.keyboard.up("Shift")
-    assert page.field(width) == pytest.approx(wide * ratio, rel=5e-3)
-    assert page.field(name) == moved
+    assert (page.field(name), page.field(width)) == (moved, pytest.approx(wide * ratio, rel=5e-3))
 
 
 def test_marks_stand_where_the_margins_are(page: Page) -> None:

@@ -36,19 +36,16 @@ def glance(document: dict[str, Any]) -> dict[str, Any]:
 
 
 def test_every_loop_shows_five_figures_and_the_distance_to_its_own_requirement(built: Built) -> None:
-    result = glance(built.document)
-    loops = [row["loop"] for row in result["loops"]]
-    assert loops == ["Current loop, rotor free", "Velocity loop", "Position loop"]
+    loops = {row["loop"]: row["figures"] for row in glance(built.document)["loops"]}
+    assert list(loops) == ["Current loop, rotor free", "Velocity loop", "Position loop"]
     items = {item["id"]: item for item in built.document["sections"][1]["blocks"][0]["items"]}
-    for name, row in zip(("current", "velocity", "position"), result["loops"], strict=True):
-        cells = {cell["label"]: cell for cell in row["figures"]}
-        assert len(cells) == 5
-        wanted = items[f"phase-margin/{name}"]
-        assert cells["Phase margin"]["value"] == wanted["value"]
-        assert cells["Phase margin"]["distance"] == wanted["distance"]
-    bandwidths = [row["figures"][-1]["distance"] for row in result["loops"]]
-    assert bandwidths[:2] == [None, None]  # required of the position loop only
-    assert bandwidths[2] == pytest.approx(items["position-bandwidth"]["value"] - 15.0)
+    for name, figures in zip(("current", "velocity", "position"), loops.values(), strict=True):
+        (cell,) = (cell for cell in figures if cell["label"] == "Phase margin")
+        wanted = {key: items[f"phase-margin/{name}"][key] for key in ("value", "distance")}
+        assert (len(figures), cell.items() >= wanted.items()) == (5, True)
+    room = items["position-bandwidth"]["value"] - 15.0  # required of the position loop only
+    distances = [figures[-1]["distance"] for figures in loops.values()]
+    assert distances == [None, None, pytest.approx(room)]
 
 
 @pytest.mark.parametrize("kept", ["position-bandwidth", "command-bandwidth"])
@@ -58,40 +55,33 @@ def test_a_distance_stands_beside_the_figure_that_it_belongs_to(kept: str) -> No
     design = replace(design, requirements=tuple(one for one in design.requirements if one.id == kept))
     figures = all_loop_figures(assemble_loops(design))
     items = [item(one) for one in evaluate_requirements(design, figures)]
-    (block, *_) = answer.section(figures, items, [])["blocks"]
-    cell = block["loops"][-1]["figures"][-1]
+    cell = answer.section(figures, items, [])["blocks"][0]["loops"][-1]["figures"][-1]
     assert cell["value"] == pytest.approx(5.62, abs=0.01)
-    assert (cell["distance"], cell["limit"]) in ((cell["value"] - 5.0, 5.0), (None, None))
-    assert (cell["distance"] is None) == (kept == "position-bandwidth")
+    wanted = (None, None) if kept == "position-bandwidth" else (cell["value"] - 5.0, 5.0)
+    assert (cell["distance"], cell["limit"]) == wanted
 
 
 def test_the_first_screen_says_how_far_it_is_believed_and_where_it_is_linear(built: Built) -> None:
     result = glance(built.document)
-    assert result["believed"].startswith("Linear equals simulated to 10⁻⁹; ")
-    assert result["believed"].endswith("checks by simulation met; nothing unproven.")
+    checks = "checks by simulation met; nothing unproven."
+    assert re.fullmatch(rf"Linear equals simulated to 10⁻⁹; .*{checks}", result["believed"])
     linear = "A sine of full deflection (10 deg) stays linear up to 0.362 Hz; above, the speed limit acts."
-    assert result["linear"] == linear
-    assert len(result["findings"]) == 3
-    assert result["linear"] not in [item["text"] for item in result["findings"]]
-    ids = {part["id"] for part in built.document["sections"]}
-    assert {item["where"] for item in result["findings"]} <= ids  # each leads to a section
+    told = {item["text"]: item["where"] for item in result["findings"]}
+    assert (result["linear"], len(told), linear in told) == (linear, 3, False)
+    assert {*told.values()} <= {part["id"] for part in built.document["sections"]}  # each leads to one
 
 
 def test_cogging_is_a_border_of_the_linear_model_by_name() -> None:
     """Slow sines are followed: the motor turns N A, a tenth of a period is 0.2 pi/Z. A speed drive runs."""
     motor = {"cogging_Nm": 1e-7, "cogging_periods": 24.0}
     drive = changed(load_design("ilr33-amber"), motor=motor, requirements=())
-    w = np.array([1e-3, 2e-3])
-    loops = assemble_loops(drive)
-    border = with_cogging(loops, onset(loops, w))
+    each = (assemble_loops(one) for one in (drive, changed(drive, controller={"position": None})))
+    border, of_speed = (with_cogging(loops, onset(loops, np.array([1e-3, 2e-3]))) for loops in each)
     by_hand = 0.2 * np.pi / 24.0 / drive.total_ratio
     assert border.each_rad["cogging"] == pytest.approx(by_hand, rel=2e-3)
-    assert border.active == ("cogging", "cogging")
-    loops = assemble_loops(changed(drive, controller={"position": None}))
-    assert "cogging" not in with_cogging(loops, onset(loops, w)).each_rad
-    assert (
-        "cogging (the motor turned by a tenth of its period) acts" in limits.section(drive, border)["result"]
-    )
+    assert (border.active, "cogging" in of_speed.each_rad) == (("cogging", "cogging"), False)
+    said = limits.section(drive, border)["result"]
+    assert "cogging (the motor turned by a tenth of its period) acts" in said
 
 
 def test_a_bar_has_the_band_of_the_corners(built: Built) -> None:
@@ -115,15 +105,13 @@ def finding(text: str, where: str, severity: doc.Severity = "warn") -> doc.Findi
 def test_findings_come_from_the_sections_gravest_first_once_and_in_turns() -> None:
     """A section that has much to say leaves room for what the others have to say of the same weight."""
     mild, grave = finding("b", "two", "info"), finding("a", "one", "fail")
-    one, two = (
-        doc.section("one", "One", [], findings=[mild, grave]),
-        doc.section("two", "Two", [], findings=[mild]),
+    loud = [finding(text, "loud") for text in "abcd"]
+    quiet = [finding("e", "quiet"), finding("f", "quiet", "fail")]
+    one, two, three, four = (
+        doc.section("x", "X", [], findings=f) for f in ([mild, grave], [mild], loud, quiet)
     )
     assert gathered([one, two, {"id": "of-an-older-file"}]) == [grave, mild]
-    loud = doc.section("loud", "Loud", [], findings=[finding(text, "loud") for text in "abcd"])
-    said = [finding("e", "quiet"), finding("f", "quiet", "fail")]
-    quiet = doc.section("quiet", "Quiet", [], findings=said)
-    assert "".join(item["text"] for item in gathered([loud, quiet])) == "faebcd"
+    assert "".join(item["text"] for item in gathered([three, four])) == "faebcd"
 
 
 @pytest.mark.parametrize(("more", "said"), [
@@ -150,9 +138,9 @@ def test_an_unmet_requirement_is_the_weakest_point_and_fails_the_screen() -> Non
     others = [one for one in design.requirements if one.quantity != "phase_margin"]
     document = design_report(replace(design, requirements=(*asked, *others)))
     assert document["sections"][0]["status"] == "fail"
-    result = glance(document)["weakest"]
-    assert (result["status"], result["label"]) == ("fail", "Velocity loop")
-    assert result["words"] == "phase margin 73.7 deg, required 90 deg: 16.3 deg below"
+    words = "phase margin 73.7 deg, required 90 deg: 16.3 deg below"
+    wanted = {"status": "fail", "label": "Velocity loop", "words": words}
+    assert glance(document)["weakest"].items() >= wanted.items()
 
 
 def test_every_section_opens_with_one_sentence_that_says_its_result(built: Built) -> None:

@@ -139,31 +139,26 @@ def test_many_designs_at_once_are_judged_alike() -> None:
             single = all_loop_figures(assemble_loops(make(float(slope))))
             for name, one in single.items():
                 assert many.stable(name)[k] == one.sound
-                for quantity, value in (("phase_margin", one.judged.margins.phase_margin_deg),
-                                        ("gain_margin", one.judged.margins.gain_margin_db)):  # fmt: skip
-                    expected = np.inf if value is None else value
-                    assert many.quantity(quantity, name)[k] == pytest.approx(expected, abs=1e-6)
+                for quantity in ("phase_margin_deg", "gain_margin_db"):
+                    value = getattr(one.judged.margins, quantity)
+                    found = many.quantity(quantity.rpartition("_")[0], name)[k]
+                    assert found == pytest.approx(np.inf if value is None else value, abs=1e-6)
 
 
 def test_tuning_starts_from_met_requirements() -> None:
     design = pushed()
-    asked = tuple(
-        Requirement(id=q, quantity=q, unit=unit, loop="every", minimum=limit)
-        for q, unit, limit in (("phase_margin", "deg", 10.0), ("gain_margin", "dB", 3.0))
-    )
-    problem = problem_of(design, asked, {})
-    distances = problem.distances(problem.start[None, :], problem.all_corners[:1])
-    assert (distances > 0.0).all()
+    limits = (("phase_margin", "deg", 10.0), ("gain_margin", "dB", 3.0))
+    asked = [Requirement(id=q, quantity=q, unit=unit, loop="every", minimum=low) for q, unit, low in limits]
+    problem = problem_of(design, tuple(asked), {})
+    assert (problem.distances(problem.start[None, :], problem.all_corners[:1]) > 0.0).all()
 
 
 def test_the_command_line_says_which_case_it_is(cli) -> None:
     first = " ".join(cli.text("margins", "ilr33-amber", *PUSHED).split())
-    assert first.startswith("PASS")
-    for words in ("all loops closed", "with the rotor locked", "outer loops open and rotor free"):
+    for words in ("PASS", "all loops closed", "with the rotor locked", "outer loops open and rotor free"):
         assert words in first
-    made = cli.data("margins", "ilr33-amber", *PUSHED)
-    current = made["loops"]["current"]
-    assert (made["passed"], current["stable"]) == (True, False)
+    current = cli.data("margins", "ilr33-amber", *PUSHED)["loops"]["current"]
+    assert current["stable"] is False
     assert (current["judged"]["how"], current["judged"]["stable"]) == ("rotor locked", True)
     assert "FAIL" in cli.text("margins", "ilr33-amber", *SET, "load.moment_slope=1e9 N*m/rad", status=1)
 
@@ -173,13 +168,11 @@ def test_a_range_stands_under_the_loop_whose_margins_it_begins_or_ends_with(held
     """Sliding is one of the operating points, so one end of each range is the margin of its column."""
     monkeypatch.setenv("COLUMNS", "250")
 
-    def cells(line: str) -> dict[int, str]:
-        return {one.end(): one[0] for one in re.finditer(r"\S+(?: \S+)*", line)}
-
     lines = cli.text("margins", "ilr33-amber", *held).splitlines()
 
     def row(*words: str) -> dict[int, str]:
-        return cells(next(line for line in lines if all(word in line for word in words)))
+        line = next(line for line in lines if all(word in line for word in words))
+        return {one.end(): one[0] for one in re.finditer(r"\S+(?: \S+)*", line)}
 
     for name, unit in (("Gain margin", "dB"), ("Phase margin", "deg")):
         own, over = row(f"{name}, {unit}"), row(f"{name}, operating points, {unit}")

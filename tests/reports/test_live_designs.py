@@ -81,9 +81,9 @@ def test_figures_are_those_of_margins_on_the_saved_file(name: str, opens, tmp_pa
         page.type_value(key, value)
     assert page.inner_text(".state")
     assert "Refused" not in page.inner_text(".state")
-    changed = page.saved(tmp_path / "changed.toml")
-    assert page.read() != before
-    agree(page.read(), command_line(changed), filtered)
+    changed, after = page.saved(tmp_path / "changed.toml"), page.read()
+    assert after != before
+    agree(after, command_line(changed), filtered)
     verdicts_agree(page, command_line(changed, "requirements"))
     for key in CHANGES[name]:
         assert parameter_value(load_design(changed), key) != parameter_value(DESIGNS[name], key)
@@ -144,9 +144,9 @@ def test_where_rounding_decides_no_figure_is_shown(opens, tmp_path) -> None:
     page.type_value("control.position.every", 20)
     file = page.saved(tmp_path / "hot.toml")
     assert linear_figures(Population(load_design(file), {}, 1)).withheld("position")[0]
-    assert "Stability not known" in page.inner_text(".state")
     assert "position" not in page.read()
-    assert "stability not known" in page.inner_text("table.now")
+    for place in (".state", "table.now"):
+        assert "stability not known" in page.inner_text(place).lower()
     assert page.get_attribute(".state", "class") == "state fail"
 
 
@@ -173,8 +173,7 @@ def test_cells_of_the_map_are_named_as_the_command_line_names_them(opens, tmp_pa
     design = load_design(name)
     page = opens(design)
     page.locator('[data-chart="border"]').scroll_into_view_if_needed()
-    drawn = "() => JSON.parse(document.querySelector('#hands-on').dataset.cells || '[]').length"
-    page.wait_for_function(drawn)
+    page.wait_for_selector("#hands-on[data-cells^='[[']")
     page.done(60_000)
     cells = json.loads(page.get_attribute("#hands-on", "data-cells") or "[]")
     assert len(cells) == 18 * 12

@@ -5,6 +5,7 @@ goes through ``margins``, whose figures are those of the linear form, found with
 """
 
 import math
+import re
 from dataclasses import replace
 from html import unescape
 
@@ -26,11 +27,6 @@ DROP = """([name, text]) => {
 }"""
 
 
-@pytest.fixture
-def page(opens) -> Page:
-    return opens(AMBER)
-
-
 def refusal(design: Design) -> str:
     """What the command line refuses first, values as they are then."""
     try:
@@ -45,9 +41,7 @@ def test_every_slider_leads_to_the_figures_of_the_changed_design(page: Page) -> 
     keys, refused = page.sliders(), set()
     assert len(keys) > 25
     for key in keys.values():
-        value = key["value"] * 1.2 if key["value"] else 0.4 * key["high"]
-        if key["whole"]:
-            value = key["value"] + 1.0
+        value = key["value"] + 1.0 if key["whole"] else key["value"] * 1.2 or 0.4 * key["high"]
         page.type_value(key["path"], value / key["factor"])
         changed = with_values(AMBER, {key["path"]: value}, check=False)
         if why := refusal(changed):
@@ -126,8 +120,7 @@ def test_a_link_carries_the_changes(opens, page: Page) -> None:
     page.type_value("load.inertia", 3e-4)
     page.click('[data-do="link"]')
     link = page.input_value(".sheet textarea")
-    other = opens(AMBER, fragment="#" + link.split("#")[1])
-    assert other.read() == page.read()
+    assert opens(AMBER, fragment="#" + link.split("#")[1]).read() == page.read()
 
 
 def test_a_dropped_record_is_laid_over_the_model(page: Page) -> None:
@@ -169,8 +162,7 @@ def test_a_dropped_response_is_laid_over_the_loop(page: Page) -> None:
     page.settled(lambda: page.evaluate(DROP, ["sweep.csv", "\n".join(lines)]))
     page.settled(lambda: page.get_by_label("of", exact=True).select_option("T"))
     words = page.inner_text(".record .told")
-    assert "by coherence: 2.00 dB rms, at most 2.00" in words
-    assert "5.00 deg rms, at most 5.00" in words
+    assert re.search(r"(?s)by coherence: 2\.00 dB rms, at most 2\.00.*5\.00 deg rms, at most 5\.00", words)
     for figure in ("bode", "nyquist"):
         assert page.locator(f'[data-chart="{figure}"] .keys li', has_text="measured").is_visible()
     assert page.locator('[data-chart="difference"]').is_visible()
@@ -197,6 +189,5 @@ def test_without_scripts_the_page_is_the_report_and_with_them_the_module_alone_i
     assert page.locator("#hands-on").is_hidden()
     assert page.locator("#verdicts").is_visible()
     policy = unescape(path.read_text("utf-8").split('Content-Security-Policy" content="')[1].split('"')[0])
-    assert "'wasm-unsafe-eval'" in policy
-    assert "'unsafe-eval'" not in policy
-    assert "http" not in policy
+    words = ("'wasm-unsafe-eval'", "'unsafe-eval'", "http")
+    assert [word in policy for word in words] == [True, False, False]

@@ -2,6 +2,7 @@
 
 import math
 import re
+from collections import Counter
 from dataclasses import replace
 from importlib import import_module
 from typing import Any
@@ -43,11 +44,10 @@ def test_every_section_that_a_review_asks_for_is_there(built: Built) -> None:
     ids = [part["id"] for part in built.document["sections"]]
     assert ids[:3] == ["answer", "verdicts", "validation"]
     wanted = {"margins", "loop-current", "loop-velocity", "loop-position", "forms", "break-points"}
-    wanted |= {"operating-points", "delays", "limits", "parameters", "provenance"}
-    assert wanted <= set(ids)
-    drawn = [block["figure"] for block in doc.figures(built.document)]
-    for name, count in {"bode": 4, "closed_bode": 3, "nyquist": 3, "sensitivity": 3, "step": 4}.items():
-        assert drawn.count(name) == count  # one Bode and one step on the first screen
+    assert wanted | {"operating-points", "delays", "limits", "parameters", "provenance"} <= set(ids)
+    drawn = Counter(block["figure"] for block in doc.figures(built.document))
+    counts = {"bode": 4, "closed_bode": 3, "nyquist": 3, "sensitivity": 3, "step": 4}
+    assert drawn.items() >= counts.items()  # one Bode and one step on the first screen
 
 
 @pytest.mark.parametrize("name", ["current", "velocity", "position"])
@@ -59,8 +59,8 @@ def test_the_tables_hold_the_margins_of_the_engine(built: Built, name: str) -> N
         return [row for row in rows if row["loop"] == loop_words(name)]
 
     (row,) = own("Stability margins")
-    assert row["gain_margin_db"] == certain(margins.gain_margin_db, "db")
-    assert row["phase_margin_deg"] == certain(margins.phase_margin_deg, "deg")
+    for key, unit in (("gain_margin_db", "db"), ("phase_margin_deg", "deg")):
+        assert row[key] == certain(getattr(margins, key), unit)
     assert row["crossover_hz"] == pytest.approx(margins.phase_margin.frequency_hz)
     assert row["delay_margin_ms"] == pytest.approx(1e3 * margins.delay_margin_s)
     assert len(own("Every gain and phase")) == len(margins.gain_margins) + len(margins.phase_margins)
@@ -82,12 +82,10 @@ def test_every_margin_is_marked_on_its_bode_figure(built: Built) -> None:
     for block, loop in zip(figures, loops, strict=True):
         margins = stability_margins(loop.open_loop)
         top, bottom = chart_of(block["chart"]).columns[0].panels
-        gains = [one for one in curves(top) if one.look.marker == "s"]
         inside = np.clip([-m.db for m in margins.gain_margins], *top.y.span())
-        assert [one.y[0] for one in gains] == pytest.approx(inside, rel=1e-5)
-        phases = [one for one in curves(bottom) if one.look.width == 2.6]
-        shown = [one.y[1] - one.y[0] for one in phases]
-        assert shown == pytest.approx([m.deg for m in margins.phase_margins], abs=1e-3)
+        assert [one.y[0] for one in curves(top) if one.look.marker == "s"] == pytest.approx(inside, rel=1e-5)
+        phases = [one.y[1] - one.y[0] for one in curves(bottom) if one.look.width == 2.6]
+        assert phases == pytest.approx([m.deg for m in margins.phase_margins], abs=1e-3)
 
 
 def test_the_phase_of_a_figure_does_not_jump_nor_go_back(built: Built) -> None:
@@ -100,9 +98,8 @@ def test_the_phase_of_a_figure_does_not_jump_nor_go_back(built: Built) -> None:
 
 def test_parameters_come_with_source_and_grade(built: Built) -> None:
     rows = {row["path"]: row for row in rows_of(built.document, "parameters", "Values")}
-    assert rows["friction.dry_torque"]["grade"] == "A"
-    assert "Table 1" in rows["friction.dry_torque"]["source"]
-    assert rows["load.inertia"]["tolerance"] == "±50 %"
+    dry, inertia = rows["friction.dry_torque"], rows["load.inertia"]
+    assert (dry["grade"], "Table 1" in dry["source"], inertia["tolerance"]) == ("A", True, "±50 %")
 
 
 def test_report_in_python_is_the_command(tmp_path, monkeypatch) -> None:
@@ -135,10 +132,8 @@ def test_a_package_shows_its_public_names_and_gives_them_all(package: str) -> No
 def test_the_page_asks_no_network_and_is_small(built: Built) -> None:
     content = built.page.read_text(encoding="utf-8")
     assert len(content) < 1_300_000
-    for tag, attributes in Page(content).tags:
-        for key in ("src", "href", "xlink:href", "action", "data"):
-            value = attributes.get(key)
-            assert value is None or value.startswith(("#", "data:,")), (tag, key, value)
+    asked = Page(content).given("src", "href", "xlink:href", "action", "data")
+    assert [value for value in asked if not value.startswith(("#", "data:,"))] == []
     names_of_xml = r'"http://www\.w3\.org/(1999|2000|XML)/\w+/?\w*"'
     outside = re.sub(names_of_xml, "", content)
     assert not re.search(r"https?://|@import|url\((?!#)", outside)
@@ -207,16 +202,15 @@ def test_every_shipped_design_has_its_report(name: str) -> None:
 def test_an_unstable_design_is_called_unstable_and_still_drawn() -> None:
     document = design_report(with_values(load_design("ilr33-amber"), {"control.velocity.gain": 5.0}))
     assert document["verdict"]["parts"]["requirements"]["not_met"] > 0
-    rows = {row["loop"]: row for row in rows_of(document, "margins", "Stability margins")}
-    assert rows["Velocity loop"]["stable"] == {"text": "unstable", "status": "fail"}
-    assert rows["Velocity loop"]["delay_margin_ms"] is None  # an unstable loop has no margins
+    (row,) = (r for r in rows_of(document, "margins", "Stability") if r["loop"] == "Velocity loop")
+    unstable = {"stable": {"text": "unstable", "status": "fail"}, "delay_margin_ms": None}
+    assert {key: row[key] for key in unstable} == unstable  # an unstable loop has no margins
     assert "unstable" in page(document)
 
 
 def test_a_linear_axis_is_told_in_its_own_units() -> None:
     document = design_report(load_design("emps"))
-    part = next(one for one in document["sections"] if one["id"] == "operating-points")
-    table = part["blocks"][0]
+    (table, *_) = next(one["blocks"] for one in document["sections"] if one["id"] == "operating-points")
     assert [column["unit"] for column in table["columns"][1:3]] == ["N", "N s/m"]
     assert table["rows"][0]["slope"] == pytest.approx(203.5034)  # viscous friction, published
 

@@ -1,8 +1,6 @@
-"""Which row of a validation sees a change of each key of a design file.
+"""Which row of a validation sees a change of each key of a design file, in the model but not in the drive.
 
-The model is changed by 1 %, the drive that is simulated is not; the first row that is not met is told.  Where
-1 % is below what a row resolves, or a whole number cannot change by so little, a larger change is told.  Run
-as a script it writes docs/validation_keys.md::
+By 1 %, or more of whole numbers or below what a row resolves. It writes docs/validation_keys.md::
 
     python -m tests.validation.mutation_table
 """
@@ -98,7 +96,7 @@ def changed(design: Design, key: str) -> Iterator[tuple[str, Design | str]]:
 
 def rows(design: Design, model: Design) -> Iterator[Row]:
     yield from design_value_rows(design, model)
-    for place in Bench(design, model).places():
+    for place in map(Bench(design, model).place, Bench(design, model).names):
         yield from small_signal(place)
 
 

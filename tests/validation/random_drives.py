@@ -350,8 +350,7 @@ def is_stable(design: model.Design) -> bool:
 
 def drives(first: int, count: int) -> Iterator[model.Design]:
     """Those of the first so many seeds that a design file may hold, stable or not."""
-    allowed = filter(is_allowed, map(full_drive, counter(first)))
-    return islice(allowed, count)
+    return islice(filter(is_allowed, map(full_drive, counter(first))), count)
 
 
 def is_allowed(design: model.Design) -> bool:

@@ -9,16 +9,8 @@ import numpy as np
 from actuator_lti.design import model
 from tests.changed import changed
 from tests.loops.own_laws import random_law
-from tests.validation.random_drives import (
-    DAMPED,
-    Dice,
-    Parts,
-    elastic,
-    friction_map,
-    full_drive,
-    full_torque,
-    is_allowed,
-)
+from tests.validation import random_drives
+from tests.validation.random_drives import DAMPED, Dice, Parts, full_drive, full_torque, is_allowed
 
 
 def rich_drive(seed: int, own_law: bool = True) -> model.Design:
@@ -35,7 +27,7 @@ def _rich(seed: int, own_law: bool) -> model.Design:
 
 def _springy(dice: Dice, design: model.Design) -> Parts:
     plain = design.coupling is None and design.controller.position is not None
-    return elastic(dice, design) if plain else {}
+    return random_drives.elastic(dice, design) if plain else {}
 
 
 def _bent(dice: Dice, design: model.Design) -> Parts:
@@ -73,7 +65,7 @@ def _rubbing(dice: Dice, design: model.Design) -> Parts:
         return {}
     own: Parts = {"breakaway_ratio": dice.one_of(1.0, 1.6), "offset_torque_Nm": 0.1 * dry}
     mapped = friction.law == "coulomb" and dry > 0.0 and friction.dry_torque_reverse_Nm is None
-    own |= friction_map(design) if mapped and dice.chance(0.5) else {}
+    own |= random_drives.friction_map(design) if mapped and dice.chance(0.5) else {}
     points = own.get("points", friction.points)
     if points and dice.chance(0.5):
         back = tuple(changed(one, direction="reverse", torque_Nm=share * one.torque_Nm) for one in points)

@@ -10,13 +10,8 @@ import pytest
 from actuator_lti import assemble_loops, load_design, stability_margins
 from actuator_lti.asked.verdict import Verdict
 from actuator_lti.design import model
-from analyses.large_signal.conditional import (
-    Conditional,
-    conditional_stability,
-    saturation_gain,
-    saturation_ratio,
-    step_threshold,
-)
+from analyses.large_signal import conditional as behind_limits
+from analyses.large_signal.conditional import Conditional, conditional_stability, step_threshold
 from analyses.motion.settling import settle
 from analyses.validation import QUICK, validate
 from analyses.validation.places import Bench
@@ -62,10 +57,7 @@ def test_the_threshold_is_where_steps_stop_settling(conditional: Conditional) ->
 
 
 def test_lower_gain_margin_by_hand(conditional: Conditional) -> None:
-    """Three integrations, two zeros: stable above g = 1/(w_v (Tn + 1/Kv)), w_v = Kp kM/J, by Routh.
-
-    The delay-free cubic with an ideal current loop; the sampled loop with its current loop lies within 3 %.
-    """
+    """Stable above g = 1/(w_v (Tn + 1/Kv)), w_v = Kp kM/J, by Routh: the delay-free cubic, within 3 %."""
     by_hand = 1.0 / (2.5 * 0.02 / 1e-3 * (0.041 + 1.0 / 24.0))
     assert conditional.margins["i_ref"].gain_lower == pytest.approx(by_hand, rel=0.05)
 
@@ -76,7 +68,7 @@ def test_the_describing_function_predicts_the_limit_cycle(conditional: Condition
     assert one.point == "i_ref"
     assert one.limit == pytest.approx(12.0)
     assert not one.antiwindup
-    assert saturation_gain(one.amplitude / one.limit) == pytest.approx(one.gain_lower, rel=1e-9)
+    assert behind_limits.saturation_gain(one.amplitude / one.limit) == pytest.approx(one.gain_lower, rel=1e-9)
     assert conditional.oscillation_hz == pytest.approx(one.frequency_hz, rel=0.2)
     assert conditional.oscillation_rad == pytest.approx(one.output_rad, rel=0.2)
 
@@ -121,11 +113,12 @@ def test_the_validator_says_so() -> None:
 
 def test_saturation_gain() -> None:
     """Analytic: 1 up to the limit, 1/3 + sqrt(3)/(2 pi) at twice the limit, 4/(pi a) far beyond."""
-    assert saturation_gain(0.5) == 1.0
-    assert saturation_gain(2.0) == pytest.approx(1.0 / 3.0 + 3.0**0.5 / (2.0 * pi), rel=1e-12)
-    assert saturation_gain(1e4) == pytest.approx(4.0 / (pi * 1e4), rel=1e-8)
+    assert behind_limits.saturation_gain(0.5) == 1.0
+    assert behind_limits.saturation_gain(2.0) == pytest.approx(1.0 / 3.0 + 3.0**0.5 / (2.0 * pi), rel=1e-12)
+    assert behind_limits.saturation_gain(1e4) == pytest.approx(4.0 / (pi * 1e4), rel=1e-8)
     for gain in (0.9, 0.3, 0.01):
-        assert saturation_gain(saturation_ratio(gain)) == pytest.approx(gain, rel=1e-10)
+        ratio = behind_limits.saturation_ratio(gain)
+        assert behind_limits.saturation_gain(ratio) == pytest.approx(gain, rel=1e-10)
 
 
 @pytest.mark.parametrize(("seed", "ending", "limiter"), [
@@ -160,10 +153,7 @@ def unstable(slope_Nm_rad: float, volts: float = 10.0, full_rad: float = 3.0) ->
 
 @pytest.mark.parametrize("slope", [20.0, 40.0])
 def test_largest_deflection_that_an_unstable_load_lets_come_back(slope: float) -> None:
-    """J th'' = c th + tau, |tau| <= tau_max: th + th'/l, l = sqrt(c/J), must stay within tau_max/c.
-
-    The command creeps there by its profile; P controllers of stiffness K end at r K/(K - c).
-    """
+    """J th'' = c th + tau: th + th'/l, l = sqrt(c/J), within tau_max/c; P controllers end at r K/(K - c)."""
     found = looked(unstable(slope))
     N, k, J = 10.0, 0.5, 2e-3
     largest = k * 10.0 * N / slope * (1.0 - slope / (k * 1.6 * 30.0 * N**2))
@@ -218,10 +208,7 @@ def sizes(hertz: Any, feedforward: float = 3.0) -> tuple[np.ndarray, np.ndarray]
 
 @pytest.mark.parametrize("law", ["clamped", "conditional"])
 def test_the_linear_border_knows_the_clamp(law: str) -> None:
-    """Where feed-forward is, the integral may be first; without it the output is.
-
-    There the integral lags the error by less than 90 degrees in samples: what adds to it is larger.
-    """
+    """Behind feed-forward the integral may be first; without it lags the error by less than 90 degrees."""
     for feedforward in (3.0, 0.0):
         hertz = np.geomspace(0.1, 100.0 if feedforward else 900.0, 40)
         output, integral = sizes(hertz, feedforward)

@@ -143,10 +143,7 @@ def test_a_value_beyond_the_limits_of_its_tolerance_loses_it(value: float, stays
 
 
 def test_corners_and_samples_say_the_same_of_what_takes_an_analysis(tmp_path, monkeypatch) -> None:
-    """The duty takes 10 mA and more, less than 1 kA: the one fails, the other is known of one design.
-
-    It is computed once for all of them.
-    """
+    """Between 10 mA and 1 kA, computed once: one limit fails, the other is known of one design alone."""
     duty = Mock(wraps=asked_figures.duty)
     monkeypatch.setitem(asked_figures._ANSWERS, "duty", duty)
     limits = {"less": 1e-3, "more": 1e3}

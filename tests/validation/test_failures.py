@@ -13,7 +13,7 @@ from actuator_lti.design import load_design, read_design_text, with_overrides
 from actuator_lti.design.model import Load, PositionLoop
 from analyses.failures import Asked, failures
 from analyses.failures.cases import Rig, _sines, cases_of
-from analyses.failures.run import MOST_TICKS, _hold, _settling_s, _worse
+from analyses.failures.run import MOST_TICKS, _followed, _hold, _settling_s, _worse
 from nonlinear import commands, simulate
 from reports.charts.svg import draw_svg
 from reports.sections.failures import section, summary
@@ -200,8 +200,8 @@ def test_no_deflection_is_beyond_the_stop_and_a_drive_without_a_current_limit_ha
     """The stop is hard: the tick that passes it is not seen, the time on the way to it is."""
     design = changed(AMBER, limits={"peak_current_A": inf, "peak_time_s": None})
     found = failures(design, Asked.of(design, detection_s=0.3, watched_s=0.3))
-    free = failures(design, replace(found.asked, stop_rad=10.0))
-    case, other = (one.case("hard-over") for one in (found, free))
+    free = replace(found.asked, stop_rad=10.0)
+    case, other = found.case("hard-over"), _followed(Rig(design, 0.0), free, cases_of(design, free)[0][0])
     assert case.at_detection_rad == found.asked.stop_rad == case.deflection_rad.max()
     assert case.to_stop_s == np.interp(found.asked.stop_rad, other.deflection_rad, other.time_s)
     assert len(found.cases) == 7
@@ -241,29 +241,18 @@ def test_a_self_locking_drive_is_where_it_holds_before_a_failure() -> None:
 
 
 SLOT_CAR = """
-[design]
-name = "slot-car"
+design = {name = "slot-car"}
+gear = [{name = "crown", ratio = 3}]
+load = {inertia = "100 g*cm^2", path = "back-drivable", moment_max = "10 mN*m"}
+friction = {dry_torque = "0.5 mN*m"}
+encoder = {counts_per_rev = 48, speed = "difference", difference_samples = 4}
+limits = {voltage = "7.4 V"}
 [motor]
 constants = "dc"
 resistance = "1.3 ohm"
 inductance = "0.35 mH"
 torque_constant = "3.5 mN*m/A"
 rotor_inertia = "1.1 g*cm^2"
-[[gear]]
-name = "crown"
-ratio = 3
-[load]
-inertia = "100 g*cm^2"
-path = "back-drivable"
-moment_max = "10 mN*m"
-[friction]
-dry_torque = "0.5 mN*m"
-[encoder]
-counts_per_rev = 48
-speed = "difference"
-difference_samples = 4
-[limits]
-voltage = "7.4 V"
 [control]
 period = "1 ms"
 computing_delay = "0.2 ms"

@@ -136,22 +136,17 @@ def test_the_integral_takes_lost_motion_and_error_away() -> None:
 
 @pytest.mark.parametrize(("breakaway", "hunts"), [(1.0, False), (1.5, True)])
 def test_hunting_needs_breakaway_above_sliding_friction(breakaway: float, hunts: bool) -> None:
-    """A fast speed integral and high Kv: it hunts once breakaway exceeds sliding friction, else not.
-
-    A describing function of dry friction foresees none either way; the simulator refutes it.
-    """
+    """Fast integral, high Kv: a describing function foresees no cycle; breakaway above sliding makes one."""
     values = {"friction.breakaway_ratio": breakaway, "control.velocity.integral_time": 3e-3}
     design = with_values(AMBER, {**values, "control.position.gain": 250.0})
-    threshold, cycles = static_threshold(design).forward_rad, limit_cycles(design, 0.0)
+    cycles = limit_cycles(design, 0.0)
     assert cycles.confirmations == ()
     assert (cycles.hunting is not None) == hunts
     assert cycles.described == (not hunts)
     if cycles.hunting is not None:
         assert not cycles.hunting.rest.limited
-        assert cycles.hunting.rest.frequency_hz == pytest.approx(9.59, rel=0.01)
-        assert cycles.hunting.swing_rad == pytest.approx(0.0991 * threshold, rel=0.02)
         # the same from any start: it is a cycle, not a slow decay
-        again = settle(design, 0.0, 3.0 * threshold)
+        again = settle(design, 0.0, 3.0 * static_threshold(design).forward_rad)
         assert again.swing_rad == pytest.approx(cycles.hunting.swing_rad, rel=0.01)
 
 

@@ -2,7 +2,7 @@
 
 import math
 from dataclasses import replace
-from math import ceil, exp, inf, pi, sin
+from math import ceil, inf, pi, sin
 
 import numpy as np
 import pytest
@@ -79,12 +79,7 @@ def test_current_and_rate_at_8_Nm(amber: Specification) -> None:
     assert loaded.current_ratio == pytest.approx(loaded.simulated_current_A / 4.0)
     assert math.degrees(loaded.figures.output_rate_rad_s) == pytest.approx(22.7, abs=0.05)
     assert loaded.duty == 1.0
-
-
-def test_thermal_duty() -> None:
-    assert thermal_duty(AMBER, 12.0) == pytest.approx(1.0 / 9.0)
-    assert thermal_duty(AMBER, 2.0) == 1.0
-    assert thermal_duty(load_design("emps"), None) is None
+    assert [thermal_duty(AMBER, rms_A) for rms_A in (12.0, 2.0, None)] == [pytest.approx(1 / 9), 1.0, None]
 
 
 def test_a_sine_within_the_limits_needs_the_current_of_its_friction(amber: Specification) -> None:
@@ -199,17 +194,6 @@ def test_the_peak_is_that_of_the_motion_repeated_without_its_start() -> None:
     assert there.peak_A == np.abs(there.current_A).max()
 
 
-def test_without_any_rating_nothing_is_proven() -> None:
-    assert duty(FIN).verdict == "not proven"
-
-
-def test_motion_and_rest_add_by_their_squares() -> None:
-    result = duty(JOINT, Asked.of(JOINT, share=0.25, cycle_s=8.0, load_Nm=30.0))
-    squares = 0.25 * result.moving_rms_A**2 + 0.75 * result.holding_A**2
-    assert result.rms_A**2 == pytest.approx(squares, rel=1e-12)
-    assert result.holding_A > 0.0
-
-
 def test_the_overload_state_is_that_of_the_running_drive() -> None:
     """A short protection, so that a few seconds settle it: the largest state of the last period."""
     design = with_overrides(JOINT, {"limits.peak_time": "50 ms"})
@@ -284,13 +268,8 @@ def test_temperature_against_its_equation(rms: float) -> None:
     assert (result.limit_after_s is None) == (result.final_degC <= 125.0)
 
 
-def test_without_heat_of_its_own_the_rise_is_an_exponential() -> None:
-    design = with_overrides(FIN, {**HOT, "temperature.resistance_coefficient": "0 1/K"})
-    result, k = heating(design, 5.0), 100
-    assert result.temperature_degC[k] == pytest.approx(25.0 + 50.0 * (1.0 - exp(-result.time_s[k] / 60.0)))
-
-
 def test_section_figure_and_command(cli) -> None:
+    assert duty(FIN).verdict == "not proven"  # without any rating
     made = section(duty(with_overrides(FIN, HOT)))
     (figure,) = [block for block in made["blocks"] if block["kind"] == "figure"]
     assert "Winding" in draw_svg(figure, page=False)

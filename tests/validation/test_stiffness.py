@@ -16,13 +16,8 @@ from actuator_lti.design.model import Gravity, Load
 from actuator_lti.drive.facts import resonance_rad_s
 from actuator_lti.loops import assemble_loops
 from actuator_lti.loops.stiffness import compliance, lost_motion_rad, stiffness_at
-from analyses.stiffness import (
-    check_stiffness,
-    lost_motion_seen,
-    stiffness,
-    stiffness_at_rest,
-    stiffness_curves,
-)
+from analyses.stiffness import check_stiffness, stiffness, stiffness_at_rest, stiffness_curves
+from analyses.stiffness.run import lost_motion_seen
 from reports.charts.svg import draw_svg
 from reports.sections.stiffness import section
 from tests.changed import changed

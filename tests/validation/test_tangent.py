@@ -16,14 +16,9 @@ from analyses.validation.in_time import bench_sweep
 from analyses.validation.places import Bench
 from analyses.validation.small_signal import nearest_pole, small_signal
 from nonlinear import tangent
+from nonlinear.bench import operating_motion as motions
 from nonlinear.bench.lifted import GRID, relative
-from nonlinear.bench.operating_motion import (
-    on_its_stand,
-    on_the_bench,
-    operating_motion,
-    operating_motion_at,
-    without_counts,
-)
+from nonlinear.bench.operating_motion import on_its_stand, on_the_bench, operating_motion
 from tests.changed import changed
 from tests.loops.own_laws import random_law
 from tests.validation.random_drives import full_drive, is_stable
@@ -54,10 +49,7 @@ def predicted(bench: Design, loops: Loops, place: str) -> np.ndarray:
 
 @pytest.mark.parametrize("drive", [*shipped_designs(), *RANDOM])
 def test_every_loop_and_break_point_is_that_of_the_linear_writing(drive: str | int) -> None:
-    """Of random drives with play, gravity, maps, filters, every sensor, several rates, unstable loops, too.
-
-    The stated error of a shipped drive is 1e-7 or less.
-    """
+    """Random drives with play, gravity, maps, filters, sensors, rates, unstable; shipped ones to 1e-7."""
     shipped = isinstance(drive, str)
     try:
         bench, loops = stood(load_design(drive) if shipped else full_drive(drive))
@@ -112,10 +104,7 @@ def test_a_slow_pole_is_judged_by_its_own_error() -> None:
 
 @pytest.mark.parametrize("integral_time_s", [None, 0.3])
 def test_a_standing_drive_stands_where_its_cogging_is_taken(integral_time_s: float | None) -> None:
-    """A law fed with the twist of a pressed coupling asks for a speed command: an error gives it, or the PI.
-
-    The motor stood off its angle by that error, on another slope of the cogging: 0.4 % off in a drawn drive.
-    """
+    """A law fed with a pressed twist asks for a speed: the motor stood off by an error, 0.4 % in a slope."""
     plain = changed(
         load_design("ilr33-amber-compliant"),
         motor={"cogging_Nm": 2e-3, "cogging_periods": 5.0},
@@ -193,7 +182,7 @@ def test_a_moving_drive_is_pressed_at_no_cost_to_its_motor() -> None:
     """The coupling of a seed of which its rating presses 9e-5 of the play; a torque at the shaft holds it."""
     drive = on_its_stand(on_the_bench(full_drive(1_700_648)))
     coupling, motion = drive.coupling, operating_motion(drive)
-    plain = operating_motion_at(drive, motion.speed_rad_s, motion.load_Nm)
+    plain = motions.operating_motion_at(drive, motion.speed_rad_s, motion.load_Nm)
     assert motion.speed_rad_s > 0.0
     past_rad = abs(motion.twist_rad) - 0.5 * coupling.play_rad
     assert past_rad == pytest.approx(0.01 * coupling.play_rad, rel=1e-9)
@@ -215,8 +204,7 @@ def test_a_rest_that_an_integral_holds_is_no_border_under_any_delay() -> None:
 def test_a_margin_at_rest_is_proven_as_far_as_it_is_resolved() -> None:
     """A P current loop feeds 0.8 of the back-EMF forward: at 1/0.8 the speed is an integrator, exactly.
 
-    Its pole is at 1 - 2.7e-9 a tick; a response beside 0 Hz was taken for that at 0 Hz once.  With errors of
-    the entries 100 times as large it is not proven.
+    Its pole is at 1 - 2.7e-9 a tick: no response beside 0 Hz. With 100 times the errors it is not proven.
     """
     design = full_drive(910_869)
     assert design.controller.current.back_emf_feedforward == 0.8
@@ -236,10 +224,7 @@ def test_a_margin_at_rest_is_proven_as_far_as_it_is_resolved() -> None:
 
 
 def test_a_resonance_that_is_not_resolved_is_not_proven() -> None:
-    """A load of damping 5e-9: each figure is allowed what the errors make of it where it is.
-
-    Its coupling, pressed past the play, is resolved; with errors of the entries 1e4 times as large it is not.
-    """
+    """Damping of 5e-9, pressed past the play, is resolved; with errors of the entries times 1e4 not."""
     design = full_drive(760_008)
     place = Bench(design, design).place("u")
     assert all(row.verdict is Verdict.MET for row in small_signal(place))
@@ -257,7 +242,7 @@ def test_a_resonance_that_is_not_resolved_is_not_proven() -> None:
 )
 def test_counts_are_no_part_of_a_tangent(place: str) -> None:
     """A drive with counts has the tangent of the same drive without them."""
-    counted, ideal = (tangent(one, place) for one in (JOINT, without_counts(JOINT)))
+    counted, ideal = (tangent(one, place) for one in (JOINT, motions.without_counts(JOINT)))
     assert counted.stated_error < 1e-8
     assert relative(counted.closed(Z), ideal.closed(Z)).max() < 1e-9
 

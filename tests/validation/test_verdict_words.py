@@ -197,8 +197,10 @@ def test_what_diverges_only_after_the_run_says_so() -> None:
     assert re.fullmatch(r"followed for \S+ s beyond the run", ended.later)
 
 
-SPEED_DRIVE = """[design]
-name = "turning"
+SPEED_DRIVE = """
+design = {{name = "turning"}}
+encoder = {{{encoder}}}
+limits = {{voltage = "48 V", speed = "900 rpm"}}
 [motor]
 resistance = "0.6 ohm"
 inductance = "2 mH"
@@ -207,44 +209,32 @@ back_emf_constant = "0.4 V*s/rad"
 rotor_inertia = "460 g*cm^2"
 cogging = "{cogging}"
 cogging_periods = 50
-[limits]
-voltage = "48 V"
-speed = "900 rpm"
 [control]
 period = "25 us"
 computing_delay = "25 us"
-[control.current]
-gain = "4 V/A"
-integral_time = "3 ms"
-[control.velocity]
-gain = "0.3 A*s/rad"
-integral_time = "50 ms"
-every = 40
+current = {{gain = "4 V/A", integral_time = "3 ms"}}
+velocity = {{gain = "0.3 A*s/rad", integral_time = "50 ms", every = 40}}
 """
+DIFFERENCE = 'speed = "difference", filter_time = "1 ms"'
 
 
-@pytest.mark.parametrize(("cogging", "ends"), [("68 mN*m", "ripple"), ("0 N*m", "becomes steady")])
-def test_what_swings_as_often_as_the_cogging_passes_is_its_ripple(cli, tmp_path, cogging, ends) -> None:
-    """50 periods a turn at one turn a second: 50 Hz."""
-    path = tmp_path / "turning.toml"
-    path.write_text(SPEED_DRIVE.format(cogging=cogging))
-    said = cli.data("simulate", str(path), "--amplitude", "360 deg/s", "--duration", "1")
-    assert said["status"] == ends
-    assert ("at 50 Hz" in said["status_detail"]) == (ends == "ripple")
-
-
-@pytest.mark.parametrize(("counts", "ends"), [("", "ripple"), ("counts_per_rev = 4000", "limit cycle")])
-def test_what_passes_between_two_updates_is_a_ripple_where_it_swings_by_nothing_else(
-    cli, tmp_path, counts: str, ends: str
+@pytest.mark.parametrize(("encoder", "cogging", "turns", "ends", "words"), [
+    ("", "68 mN*m", 1, "ripple", "at 50 Hz"),
+    ("", "0 N*m", 1, "becomes steady", ""),
+    (DIFFERENCE, "68 mN*m", 8, "ripple", "passing at 400 Hz"),  # seen every millisecond
+    # speeds made of 4000 counts, 90 deg/s each, swing by themselves
+    (f"{DIFFERENCE}, counts_per_rev = 4000", "68 mN*m", 8, "limit cycle", "without the cogging limit cycle"),
+])  # fmt: skip
+def test_what_swings_as_often_as_the_cogging_passes_is_its_ripple(
+    cli, tmp_path, encoder: str, cogging: str, turns: int, ends: str, words: str
 ) -> None:
-    """400 Hz, seen every millisecond; speeds made of 4000 counts, 90 deg/s each, swing by themselves."""
+    """50 periods a turn, at so many turns a second."""
     path = tmp_path / "turning.toml"
-    encoder = f'[encoder]\nspeed = "difference"\nfilter_time = "1 ms"\n{counts}\n[limits]'
-    path.write_text(SPEED_DRIVE.format(cogging="68 mN*m").replace("[limits]", encoder))
-    said = cli.data("simulate", str(path), "--amplitude", "2880 deg/s", "--duration", "1")
+    path.write_text(SPEED_DRIVE.format(cogging=cogging, encoder=encoder))
+    said = cli.data("simulate", str(path), "--amplitude", f"{360 * turns} deg/s", "--duration", "1")
     assert said["status"] == ends
-    other = "passing at 400 Hz" if ends == "ripple" else "without the cogging limit cycle"
-    assert other in said["status_detail"]
+    assert words in said["status_detail"]
+    assert words or "Hz" not in said["status_detail"]
 
 
 @pytest.mark.parametrize(("millionths", "verdict"), [(0.5, "at rest"), (2.0, "limit cycle")])
