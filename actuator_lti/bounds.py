@@ -36,11 +36,8 @@ class Bound:
         """
         if value <= self.most:
             return
-        asked = name or self.asked_by
-        shown = _readable(value, self.unit)
-        raise InputError(
-            f"{asked + ': ' if asked else ''}{shown} {self.what}; allowed: {self.allowed}", where
-        )
+        asked = f"{name or self.asked_by}: ".removeprefix(": ")
+        raise InputError(f"{asked}{_readable(value, self.unit)} {self.what}; allowed: {self.allowed}", where)
 
 
 def _readable(value: float, unit: str) -> str:

@@ -62,7 +62,6 @@ class Quantity:
 
     @property
     def label(self) -> str:
-        """What stands beside its number."""
         return self.title or self.words[0].upper() + self.words[1:]
 
     @property
@@ -81,7 +80,6 @@ class Quantity:
         return self.reader.startswith(("bandwidth.", "step."))
 
     def unit_for(self, axis: Axis) -> str:
-        """The unit in which this figure is reported."""
         return self.linear_unit if axis == "linear" and self.linear_unit else self.unit
 
     def raw(self, result: Any) -> Any:

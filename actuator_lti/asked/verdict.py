@@ -7,7 +7,7 @@ records of a bench do not tell: unless something fails).
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from enum import StrEnum
 from typing import Literal
 
@@ -69,14 +69,10 @@ class Tally:
         return cls(met=met, not_met=not_met, not_proven=open_.count(False), waived=open_.count(True))
 
     def __add__(self, other: Tally) -> Tally:
-        """Count both."""
-        return Tally(
-            **{each.name: getattr(self, each.name) + getattr(other, each.name) for each in fields(self)}
-        )
+        return Tally(**{name: count + getattr(other, name) for name, count in vars(self).items()})
 
     @property
     def total(self) -> int:
-        """How many there are: the denominator."""
         return self.met + self.not_met + self.not_proven + self.waived
 
     @property
@@ -88,7 +84,6 @@ class Tally:
 
     @property
     def passes(self) -> bool:
-        """Whether a command may end with status 0."""
         return self.verdict.passes()
 
     @property
@@ -97,7 +92,6 @@ class Tally:
         return self.verdict.role() if self.met or not self.passes else "info"
 
     def words(self, name: str) -> str:
-        """Say it: how many of how many are met, and what the others are."""
         if not self.total:
             return f"no {name}"
         others = {"not met": self.not_met, "not proven": self.not_proven, "waived": self.waived}

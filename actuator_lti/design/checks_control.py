@@ -138,7 +138,6 @@ def _slow_enough(design: Design, key: str, value: float, limiter: str) -> Iterat
 
 
 def _written(design: Design, key: str, value: float, allowed: str) -> Refusal:
-    """A key of the command as the file has it, else in SI."""
     path = f"command.{key}"
     parameter = design.parameters.get(path)
     text = f"{value:.6g} {axis_unit(design.axis, path)}" if parameter is None else parameter.text

@@ -124,7 +124,6 @@ def with_stand_ins(design: Design) -> Design:
 
 
 def _stated(design: Design, key: str) -> str:
-    """A constant of the motor in SI, and as the file has it."""
     value = getattr(design.motor, _ELECTRICAL[key])
     return f"{value:g} {axis_unit(design.axis, f'motor.{key}')}{_as_written(design, key, 1.0)}"
 

@@ -155,22 +155,20 @@ def named_after(field: Field, attribute: str) -> Field:
     return replace(field, path=path, unit_template=unit, attribute=attribute)
 
 
-def _declared(
-    kind: Kind, words: str, symbol: str = "", *, key: str = "", unit: str = "", **more: Any
-) -> Field:
+def _field(kind: Kind, words: str, symbol: str = "", *, key: str = "", unit: str = "", **more: Any) -> Field:
     return Field(path=key, kind=kind, unit_template=unit, symbol=symbol, description=words, **more)
 
 
-quantity = partial(_declared, "quantity", low=-BIG, high=BIG)
+quantity = partial(_field, "quantity", low=-BIG, high=BIG)
 """Any finite number; ``key`` and ``unit`` where they are not those of the attribute's name."""
 positive = partial(quantity, low=SMALL)  # a number above 0
 not_negative = partial(quantity, low=0.0)  # a number of at least 0
-quantities = partial(_declared, "quantities", low=-BIG, high=BIG)  # a list of numbers
-matrix = partial(_declared, "matrix", low=-BIG, high=BIG)  # rows of as many numbers each
-names = partial(_declared, "names")  # some words, those of the attribute's type, each once
-flag = partial(_declared, "flag")  # true or false
-text, label = partial(_declared, "text"), partial(_declared, "label")  # any text; one that is not empty
-day, limit = partial(_declared, "day"), partial(_declared, "limit")
+quantities = partial(_field, "quantities", low=-BIG, high=BIG)  # a list of numbers
+matrix = partial(_field, "matrix", low=-BIG, high=BIG)  # rows of as many numbers each
+names = partial(_field, "names")  # some words, those of the attribute's type, each once
+flag = partial(_field, "flag")  # true or false
+text, label = partial(_field, "text"), partial(_field, "label")  # any text; one that is not empty
+day, limit = partial(_field, "day"), partial(_field, "limit")
 """A date; a limit of a requirement, in the unit of its quantity."""
 
 
@@ -179,9 +177,9 @@ def degrees(words: str, example: str) -> Field:
 
 
 def integer(words: str, high: int, symbol: str = "", low: int = 1) -> Field:
-    return _declared("integer", words, symbol, low=low, high=high)
+    return _field("integer", words, symbol, low=low, high=high)
 
 
 def choice(words: str, choices: tuple[str, ...] = ()) -> Field:
     """One of some words: those of the attribute's type, or fewer."""
-    return _declared("choice", words, choices=choices)
+    return _field("choice", words, choices=choices)

@@ -43,7 +43,7 @@ class Section:
 
     @property
     def optional(self) -> bool:
-        """Whether a design may be without it: its attribute is None then."""
+        """Whether its attribute is None in a design without it."""
         owner = BY_PATH[self.parent].kind if self.parent else model.Design
         return any(item.name == self.attribute and item.default is None for item in fields(owner))
 
@@ -119,7 +119,7 @@ def template_of(path: str) -> str:
 
 
 def parts_of(design: model.Design) -> Iterator[tuple[Section, str, Any]]:
-    """Each section that a design has: section, dotted path, part; repeated ones one by one."""
+    """Section, dotted path and part of each table that a design has; repeated ones one by one."""
     for section in SECTIONS:
         if section.many:
             yield from ((section, path, item) for path, item in section.items(design))

@@ -17,9 +17,7 @@ from actuator_lti.errors import InputError
 from actuator_lti.files.reading import Tree, shown
 
 _TAKES = re.compile(r', which takes "([^"]*)"( too)?')
-_AT_MOTOR = re.compile(
-    r"(motor|friction|limits)\.|control\.(velocity|position)\.gain|instruments\.angle_noise"
-)
+_MOTOR = re.compile(r"(motor|friction|limits)\.|control\.(velocity|position)\.gain|instruments\.angle_noise")
 _TICKS = re.compile(r"\s*([0-9.]+)\s*(?:ticks?|samples?|cycles?|periods?|Ts)\s*")
 BARE = re.compile(r"\s*[0-9.]+\s*\Z")
 _ROOT_OF_WATTS = re.compile(r" */ *(?:sqrt *\( *W *\)|√ *\(? *W\)?|W *(?:\^ *\(?(?:0?\.5|1/2)\)?|½))")
@@ -80,7 +78,7 @@ def hint_of(text: Any, field: Field, path: str, frame: Frame, tree: Tree) -> str
 
 def _per_count(text: Any, field: Field, frame: Frame, tree: Tree) -> str:
     """What a value in counts of the encoder is in rad or m, where the file says how many there are."""
-    if not isinstance(text, str) or not _COUNT.search(text) or not _AT_MOTOR.match(field.path):
+    if not isinstance(text, str) or not _COUNT.search(text) or not _MOTOR.match(field.path):
         return ""
     loop = tree.get("control", {}).get(field.section.rpartition(".")[2]) if field.key == "gain" else {}
     if isinstance(loop, dict) and loop.get("sensor", "motor") != "motor":  # it counts at the output
@@ -161,7 +159,6 @@ def ticks_of(path: str, period: Any, tree: Tree) -> int:
 
 
 def _time(word: str, table: Tree, key: str) -> str:
-    """The time that an integral or derivative gain is beside the gain of its table."""
     named = next((one for one in table if "gain" in (one, key_for("control.", one))), "")
     texts = [f"{table.get(one)}" for one in (named, key)]
     if CONVENTION.findall(texts[0]) != CONVENTION.findall(texts[1]):  # amperes of two kinds

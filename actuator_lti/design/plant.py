@@ -124,7 +124,6 @@ class Coupling:
 
     @property
     def bends(self) -> tuple[tuple[Any, Any], ...]:
-        """The torques at which the stiffness changes, and what it becomes."""
         return (self.torque_1_Nm, self.stiffness_2_Nm_rad), (self.torque_2_Nm, self.stiffness_3_Nm_rad)
 
     @property
@@ -295,7 +294,6 @@ class Load:
         return tuple(key for key, acts in there.items() if acts)
 
     def bare(self) -> "Load":
-        """The same without moments of its own."""
         return replace(self.level(), moment_damping_Nms_rad=0.0)
 
 

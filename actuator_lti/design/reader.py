@@ -212,7 +212,6 @@ class Reader:
         return UNREAD if strange else tuple(known)
 
     def entry(self, field: Field, raw: Any, path: str, into: dict[str, model.Parameter]) -> Any:
-        """A value with its pedigree, which is kept."""
         into[path] = UNREAD
         table = raw if isinstance(raw, dict) else {"value": raw}
         self.known(table, _ENTRY, path)
@@ -333,7 +332,6 @@ class Reader:
             return self.refuse(path, raw, getattr(error, "message", str(error)))
 
     def part(self, section: schema.Section, raw: Any, path: str) -> Any:
-        """What one table becomes, with the tables inside it."""
         named = section.many == "named"
         raw = _rows_flat(raw) if issubclass(section.kind, model.StateSpace) else raw
         raw = self.law(raw, path) if section.kind is model.Law else raw

@@ -53,7 +53,6 @@ def parse_label(label: str) -> tuple[int, int]:
 
 
 def _object_from(label: str, raw: Any) -> ControllerObject:
-    """One object from its entry in TOML: an integer, or a table with value, name and data_type."""
     index, subindex = parse_label(label)
     table = {"name": "", "data_type": "", **(raw if isinstance(raw, dict) else {"value": raw})}
     value = table.get("value")

@@ -72,7 +72,6 @@ LONGEST = 120  # characters of a quantity
 
 
 def tidy(unit: str) -> str:
-    """A unit as a product of names, powers and signs."""
     text = _POWER.sub(lambda found: f"^{found[0].translate(_RAISED)}", unit.strip().translate(_SIGNS))
     for spelling, product in _SPELLINGS:
         text = spelling.sub(product, text)
@@ -119,9 +118,8 @@ def split_quantity(text: str) -> tuple[float, str]:
         plain = millions[0].replace(",", "") + text[millions.end() :]
         raise ValueError(f"commas; write {shown(plain)}")
     if _THOUSANDS.match(text):
-        raise ValueError(
-            f"a comma; write {shown(text.replace(',', '', 1))} or {shown(text.replace(',', '.', 1))}"
-        )
+        whole, part = (shown(text.replace(",", sign, 1)) for sign in ("", "."))
+        raise ValueError(f"a comma; write {whole} or {part}")
     if _COMMA.match(text):
         raise ValueError(f"a decimal comma; use a decimal point: {shown(text.replace(',', '.', 1))}")
     if _RANGE.match(text):

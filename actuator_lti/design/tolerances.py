@@ -17,7 +17,6 @@ _KINDS: tuple[str, ...] = get_args(get_type_hints(Tolerance)["kind"])
 
 
 def _width(text: str | float | int, nominal: float, parse: Parse) -> float:
-    """A half width or a standard deviation in SI; relative where written in percent."""
     if isinstance(text, str) and text.strip().endswith("%"):
         width = parse_quantity(text, "1") * abs(nominal)
     else:
@@ -65,7 +64,6 @@ def _from_table(table: Tree, nominal: float, parse: Parse) -> Tolerance:
 
 
 def _refuse_impossible(tolerance: Tolerance, nominal: float, unit: str, field: Field) -> None:
-    """Refuse a tolerance whose values may be impossible (a half width that reaches a negative inertia)."""
     width = tolerance.half_width or 0.0
     if field.kind == "integer":
         raise InputError("allowed: none, a whole number has no tolerance")
@@ -89,9 +87,7 @@ def rescaled(tolerance: Tolerance, nominal: float) -> Tolerance | None:
 
 def tolerances(design: Design) -> tuple[tuple[str, float, Tolerance], ...]:
     """Every toleranced parameter: dotted key, nominal in SI, tolerance; in the order of the file."""
-    return tuple(
-        (p.path, p.value, p.tolerance) for p in design.parameters.values() if p.tolerance is not None
-    )
+    return tuple((p.path, p.value, p.tolerance) for p in design.parameters.values() if p.tolerance)
 
 
 def drawn(design: Design) -> tuple[tuple[str, float, Tolerance], ...]:

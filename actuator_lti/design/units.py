@@ -234,14 +234,12 @@ def _kind_of(written: str, value: UnitValue) -> str:
 
 
 _FREQUENCY = "speed or angular frequency"
-_GAIN_OF_TORQUE = (
-    "such a gain over kM, and over the ratio squared where it is of the output, is one in amperes"
-)
+_OVER_KM = "such a gain over kM, and over the ratio squared where it is of the output, is one in amperes"
 _IN_HZ = "a bandwidth is written in Hz or rad/s"
 _ADVICE = {
     (_FREQUENCY, "s"): "a corner (PI, filter) of it is {corner:.4g} s, 1/(2 pi f), a period {period:.6g} s",
     **dict.fromkeys(product((_FREQUENCY, "gain or rate"), ("A*s/rad", "V*s/rad", "V/A")), _IN_HZ),
-    ("stiffness", "A/rad"): _GAIN_OF_TORQUE,
+    ("stiffness", "A/rad"): _OVER_KM,
     ("count or line, by maker", "1"): 'write "{n:.15g} lines" ({lines:.15g} counts) or "{n:.15g} counts"',
     (_FREQUENCY, "1/s"): "a frequency in Hz becomes a gain in 1/s times 2 pi: {size:.6g} 1/s",
     ("ratio", "A"): "of the motor's rated current it is {size:.4g} times that many amperes",
@@ -320,9 +318,8 @@ def parse_quantity(text: str | float | int, unit: str) -> float:
     example = f"a number with a unit like {unit}" if unit not in ("", "1") else "a number without a unit"
     flywheel = isinstance(text, str) and _GD2.search(text) is not None
     try:
-        number, written = (
-            (float(text), "") if isinstance(text, int | float) else split_quantity(_GD2.sub("", text))
-        )
+        plain = isinstance(text, int | float)
+        number, written = (float(text), "") if plain else split_quantity(_GD2.sub("", f"{text}"))
         if not isfinite(number):
             raise ValueError("must be finite")
         result = _as_meant(written, wanted)
@@ -335,9 +332,8 @@ def parse_quantity(text: str | float | int, unit: str) -> float:
     if flywheel or not compatible(result, wanted):
         wrong = f"wrong dimension, {_kind_of(written, result)}" if written else "has no unit"
         advice = _advice(result, wanted, number) if written else ""
-        raise (AdvisedError if advice else InputError)(
-            f"{'a GD2' if flywheel else wrong}; allowed: {example}{advice}"
-        )
+        kind = AdvisedError if advice else InputError
+        raise kind(f"{'a GD2' if flywheel else wrong}; allowed: {example}{advice}")
     return value
 
 

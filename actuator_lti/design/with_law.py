@@ -30,7 +30,6 @@ def _proper(made: Callable[..., Any], *given: Any) -> Any:
 
 
 def _columns(system: Any) -> tuple[Any, ...]:
-    """Of a transfer function of python-control: one output, its columns side by side."""
     from scipy.linalg import block_diag
     from scipy.signal import tf2ss
 

@@ -152,9 +152,7 @@ def _canonical(num: Polynomial, den: Polynomial) -> Realisation:
     """Observer form (direct form II transposed) of num/den, both highest power first and of equal length."""
     b, a = [value / den[0] for value in num], [value / den[0] for value in den]
     n = len(a) - 1
-    A = tuple(
-        tuple(-a[r + 1] if c == 0 else (1.0 if c == r + 1 else 0.0) for c in range(n)) for r in range(n)
-    )
+    A = tuple(tuple(-a[r + 1] if c == 0 else float(c == r + 1) for c in range(n)) for r in range(n))
     return Realisation(A, tuple(b[r + 1] - a[r + 1] * b[0] for r in range(n)), (1.0, 0.0)[:n], b[0])
 
 

@@ -41,7 +41,6 @@ class Operating:
     torques_at_once: bool = False  # whether they act at every instant, not held over a tick (section 11)
 
     def __post_init__(self) -> None:
-        """Refuse what is no operating point."""
         if self.direction not in (1, -1):
             raise InputError(f"direction = {self.direction!r}: 1 or -1")
         for name in ("load_Nm", "speed_rad_s", "angle_rad", "twist_rad"):

@@ -50,7 +50,6 @@ def matrix(names: tuple[str, ...], entries: MatrixEntries) -> np.ndarray:
 
 
 def vector(names: tuple[str, ...], entries: Entries) -> np.ndarray:
-    """A vector over named states, stacked as `matrix`."""
     out = np.zeros((*_stack(entries.values()), len(names)))
     for name, value in entries.items():
         out[..., names.index(name)] = value
@@ -109,7 +108,6 @@ def _electrical(motor: Motor) -> tuple[MatrixEntries, Entries]:
 
 
 def _motor_side(motor: Motor, J: Any, slope: Any) -> tuple[MatrixEntries, Entries]:
-    """Entries of the motor's own equations (1), (2), (14)."""
     own = {("w", "w"): -slope / J, ("th", "w"): 1.0}
     if motor.source_gain_Nm_V is not None:
         return own, {"w": motor.source_gain_Nm_V / J}
@@ -137,7 +135,6 @@ def _own_torque(design: Design, at: Operating) -> Entries:
 
 
 def _own_moment(design: Design, at: Operating) -> Entries:
-    """The moments of `Load.moment_Nm`, made linear; those that are there."""
     damping = design.load.moment_damping_Nms_rad / design.total_ratio
     gains = {"output_angle": moment_slope(design, at), "load_speed": -damping}
     return {row: gain for row, gain in gains.items() if np.any(gain != 0)}

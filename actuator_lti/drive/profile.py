@@ -50,7 +50,6 @@ class CommandMean:
 
 
 def command_mean(design: Design) -> CommandMean | None:
-    """The mean that limits the jerk; None where there is none."""
     command, control = design.command, design.controller
     if control.position is None or command.jerk_rad_s3 == inf or command.acceleration_rad_s2 == inf:
         return None

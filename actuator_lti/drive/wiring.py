@@ -98,7 +98,6 @@ class Drive:
 
     @property
     def outermost(self) -> str:
-        """The stage that takes the command; ``"voltage"`` where there is no loop."""
         return self.stages[-1] if self.stages else "voltage"
 
     def law(self, stage: str) -> Block:
@@ -127,7 +126,6 @@ class Drive:
 
     @property
     def points(self) -> tuple[str, ...]:
-        """The break points that exist, from the motor outwards."""
         return (*(self.target[stage] for stage in self.stages), *["output"] * ("position" in self.stages))
 
     def inside(self, stage: str) -> tuple[str, ...]:

@@ -145,7 +145,7 @@ class _Reader:
         return True
 
     def _structure(self, name: str, parts: list[Part], _place: int) -> bool:
-        """The numeric and text fields of a single structure, as ``name.field``."""
+        """Numeric and text fields of a single structure, as ``name.field``."""
         shape = self._numbers(parts[1])
         if len(parts) < 5 or shape is None or np.prod(shape) != 1:
             return False

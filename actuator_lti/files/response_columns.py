@@ -5,12 +5,11 @@ from collections.abc import Mapping
 from typing import cast
 
 import numpy as np
-from numpy.typing import NDArray
 
 from actuator_lti.errors import InputError
 from actuator_lti.files.reading import shown
 from actuator_lti.measured.response import CONFIDENCE, GAUSSIAN, student
-from actuator_lti.types import Floats, Mask
+from actuator_lti.types import Complexes, Floats, Mask
 
 WHAT = "frequency response: CSV or .mat (up to -v7) with frequency, dB and deg or real and imaginary part"
 HEADS = "f_hz,gain_db,phase_deg or f_hz,real,imag"
@@ -68,7 +67,7 @@ def roles(columns: Mapping[str, Floats]) -> dict[str, str]:
 
 
 def unit_of(role: str, name: str, values: Floats) -> str:
-    """Unit of a column: as its name says, else as its numbers do; frequencies are in Hz then."""
+    """As its name says, else as its numbers do; frequencies are in Hz then."""
     if said := _said(role, name):
         return said
     if role == "size" and not (values < 0.0).any():
@@ -87,17 +86,15 @@ def _size(values: Floats, unit: str) -> Floats:
         return 10.0 ** (values / 20.0) if unit == "dB" else values
 
 
-def complex_values(table: Mapping[str, Floats], units: Mapping[str, str]) -> NDArray[np.complex128]:
+def complex_values(table: Mapping[str, Floats], units: Mapping[str, str]) -> Complexes:
     if "real" in table:
         return table["real"] + 1j * table["imaginary"]
     with np.errstate(over="ignore", under="ignore", invalid="ignore"):
         made = _size(table["size"], units["size"]) * np.exp(1j * SI[units["phase"]] * table["phase"])
-    return cast("NDArray[np.complex128]", made)
+    return cast("Complexes", made)
 
 
-def refuse_contradiction(
-    beside: Mapping[str, Floats], f: Floats, z: NDArray[np.complex128], good: Mask
-) -> None:
+def refuse_contradiction(beside: Mapping[str, Floats], f: Floats, z: Complexes, good: Mask) -> None:
     """Refuse a response z at frequencies f, in Hz, that columns beside it tell otherwise."""
     for name, values in beside.items():
         role = next((role for role, (like, _) in _UNITS.items() if like.search(name)), "")
@@ -110,7 +107,7 @@ def refuse_contradiction(
             raise InputError(f"{shown(name)} contradicts the {which} that is read; allowed: one of them")
 
 
-def _off(role: str, name: str, values: Floats, f: Floats, z: NDArray[np.complex128]) -> Floats | None:
+def _off(role: str, name: str, values: Floats, f: Floats, z: Complexes) -> Floats | None:
     """How far off a column is, over the size; ``None`` where it does not say that it is the same."""
     if role == "frequency":  # in Hz or rad/s where its name does not say so
         if _FREQUENCY_UNIT.sub("", name.lower()) not in ("f", "freq", "frequency", "omega", "w"):

@@ -46,9 +46,8 @@ class _Names(dict[str, Any]):
 def _kinds(made: Callable[..., Any]) -> dict[str, Kind]:
     """What each argument may be."""
     asked = {name: hint for name, hint in made.__annotations__.items() if name != "return"}
-    hints = get_type_hints(
-        SimpleNamespace(__annotations__=asked), localns=_Names(made.__globals__), include_extras=True
-    )
+    held = SimpleNamespace(__annotations__=asked)
+    hints = get_type_hints(held, localns=_Names(made.__globals__), include_extras=True)
     return {name: _kind(hint) for name, hint in hints.items()}
 
 

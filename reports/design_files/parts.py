@@ -28,7 +28,6 @@ _PLACES = {
 
 @cache
 def parts() -> Tree:
-    """The catalogue: ``motor`` and ``gear``, each by name."""
     return read_toml(_FILE, "catalogue")
 
 
@@ -74,10 +73,8 @@ def with_parts(text: str, motor: str | None, gear: str | None) -> str:
         text = _put(text, "[motor]", constants=json.dumps(chosen["motor"]["constants"]))
         text = re.sub(r'(?m)^((?:gain|peak_current) = "[^"]*\bA)\b', r"\1 dc", text)
     titles = ", ".join(entry["title"] for entry in chosen.values())
-    words = (
-        "Values of the data sheets; the load is assumed, limits and gains follow: change them to your own."
-    )
-    text = _put(text, "[design]", title=json.dumps(titles), description=json.dumps(words))
+    said = "Values of the data sheets; the load is assumed, limits and gains follow: change them to your own."
+    text = _put(text, "[design]", title=json.dumps(titles), description=json.dumps(said))
     return _suited(text, read_design_text(text, "design"))
 
 

@@ -158,9 +158,7 @@ def test_every_real_number_of_numpy_is_a_number(kind) -> None:
     assert (design.limits.voltage_V, design.controller.velocity.every) == (14.0, 2)
     (point,) = sweep(DESIGN, "limits.voltage", np.array([14], kind))
     assert point.design.limits.voltage_V == 14.0
-    refused(
-        lambda: DESIGN.with_values({"control.velocity.every": True}), words="every = True: allowed: a whole"
-    )
+    refused(DESIGN.with_values, {"control.velocity.every": True}, words="every = True: allowed: a whole")
 
 
 def test_loops_are_indexed_and_iterated_by_name() -> None:

@@ -223,10 +223,8 @@ def test_a_part_of_another_kind_is_refused_by_name(part: object) -> None:
             assert not [*misplaced(wrong)]
         else:
             assert [path for path, *_ in misplaced(wrong)] == [section.path]
-            with pytest.raises(
-                InputError, match=rf"^drive: {section.path} = .*allowed: .*{section.kind.__name__}"
-            ):
-                check_design(wrong, "drive")
+            kind = section.kind.__name__
+            refused(check_design, wrong, "drive", match=rf"^drive: {section.path} = .*allowed: .*{kind}")
 
 
 def test_an_axis_that_is_none_is_refused_before_its_units_are_asked_and_a_linear_one_has_masses() -> None:

@@ -156,8 +156,8 @@ def test_nights_of_real_designs_their_approval_and_a_report_as_pdf(tmp_path, cli
     done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=300)
     assert done.returncode == 1, done.stderr
     said = " ".join(done.stdout.split())  # where a cell is wrapped depends on the length of the folder's name
-    for words in ("FAIL night 1: 1 no result", "no <b>motor</b>", "motor.resistance = ", "allowed: above 0"):
-        assert words in said
+    for part in ("FAIL night 1: 1 no result", "no <b>motor</b>", "motor.resistance = ", "allowed: above 0"):
+        assert part in said
     summary = json.loads((tmp_path / "site" / "summary.json").read_text())
     names = {"ctms-motor-position", "slower", "no <b>motor</b>", "Comparison of all variants"}
     assert {d["name"] for d in summary["designs"]} == names

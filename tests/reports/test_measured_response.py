@@ -104,9 +104,8 @@ def test_command_line(tmp_path, cli) -> None:
     path = saved(tmp_path / "r.csv", truth, "gain_db,phase_deg", *columns)
     asked = ["margins", "ilr33-amber", "--response", str(path), "--response-of"]
     assert max(map(abs, cli.data(*asked, "velocity")["measured"]["difference_db"])) < 1e-9
-    made = report("ilr33-amber", validation=False, response=path, response_of="velocity")
-    (section,) = [one for one in made["sections"] if one["id"] == "measured-response"]
-    assert "velocity loop. The model explains the measurement within 0.00 dB" in section["result"]
+    said = cli.text("margins", "ilr33-amber", *asked[2:], "velocity")
+    assert "velocity loop. The model explains the measurement within 0.00 dB" in " ".join(said.split())
     assert "--response-of speed: allowed: " in cli.refused(*asked, "speed")
     refused(
         measured_over, LOOPS, Response([1.0, 1j], [1e6, 2e6]), "current", words="no two frequencies below"
@@ -129,6 +128,8 @@ def test_what_the_points_hide_is_told_wherever_the_margins_stand(tmp_path, cli) 
     page = html.unescape((tmp_path / "x" / "margins.html").read_text(encoding="utf-8"))
     held = json.dumps(json.loads((tmp_path / "x" / "margins.json").read_text()), ensure_ascii=False)
     made = report("ilr33-amber", validation=False, response=path, response_of="current")
+    (section,) = (one for one in made["sections"] if one["id"] == "measured-response")
+    assert "current loop. The model explains the measurement within" in section["result"]
     for told in (printed, page, held, json.dumps(made, ensure_ascii=False)):
         plain = "".join(told.split()).casefold().replace("\u2212", "-")
         assert all("".join(note.split()).casefold() in plain for note in one.notes)

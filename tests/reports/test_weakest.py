@@ -1,6 +1,7 @@
 """The weakest point is the worst of all views, by how near L comes to -1; the spread names its points."""
 
 from dataclasses import replace
+from functools import cache
 from math import inf, log10, radians, sin
 
 import numpy as np
@@ -29,9 +30,12 @@ from tests.changed import changed
 FIN = replace(load_design("fin"), requirements=())
 
 
-@pytest.fixture(scope="module")
+surveyed = cache(lambda name: survey_loops(load_design(name)))
+
+
+@pytest.fixture
 def survey() -> LoopSurvey:
-    return survey_loops(FIN)
+    return replace(surveyed("fin"), design=FIN)
 
 
 @given(db=st.floats(0.01, 60.0), deg=st.floats(0.01, 180.0))
@@ -121,8 +125,7 @@ def test_the_spread_is_that_of_the_operating_points_which_margins_names(cli) -> 
 
 def test_the_move_that_mends_brings_the_weakest_margin_just_within_its_limit() -> None:
     """Judged by the exact loops: with the move it is within, with a fifth of it less it is not."""
-    design = load_design("ilr33-amber")
-    seen = survey_loops(design)
+    design, seen = load_design("ilr33-amber"), surveyed("ilr33-amber")
     point = weakest(seen)
     assert (point.view.kind, point.view.load_Nm, point.quantity) == ("rest", 8.0, "phase_margin")
     move = mending(point, seen)
@@ -182,7 +185,7 @@ def test_no_move_that_costs_a_requirement(survey: LoopSurvey) -> None:
 @pytest.mark.parametrize("name", ["fin", "ilr33-amber"])
 def test_a_bode_plot_names_the_margins_nearest_to_minus_one_and_shows_them_and_0_db(name: str) -> None:
     """The fin's velocity loop has its nearest phase margin last, ilr33-amber cut at u its gain margin."""
-    found = survey_loops(load_design(name))
+    found = surveyed(name)
     cut = [point.figures for point in found.break_points.values() if point.figures]
     for one in (*found.figures.values(), *cut):
         top, bottom = open_bode("x", one, frequency_grid(one), small=True)["chart"]["columns"][0]["panels"]
