@@ -181,7 +181,7 @@ def test_a_spring_between_two_masses() -> None:
 def test_sampled_is_the_zero_order_hold_of_ideal(name: str) -> None:
     """Without own moments, which are held over a tick, and without delay: scipy's hold of the same."""
     design = prompt(name)
-    design = replace(design, load=design.load.bare(), motor=design.motor.level())
+    design = replace(design, load=design.load.bare(), motor=design.motor.straight())
     ideal, sampled = plant(design, "ideal"), plant(design)
     order = [ideal.state_labels.index(state) for state in sampled.state_labels]
     A, B, C = ideal.A[np.ix_(order, order)], ideal.B[order], ideal.C[:, order]
