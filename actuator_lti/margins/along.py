@@ -117,7 +117,8 @@ class Along:
             min([old, *((d.at(at.L), at.w) for at in reals)]) for old, d in zip(best, distances, strict=True)
         ]
         inside = [w for _, w in best if 0.0 < w < math.inf]
-        L = dict(zip(inside, self.loop.at(np.array(inside)).tolist(), strict=True)) if inside else {}
+        L = {0.0: self.ends[0]}
+        L |= dict(zip(inside, self.loop.at(np.array(inside)).tolist(), strict=True)) if inside else {}
         found = [(d.at(L[w]) if w in L else value, w) for d, (value, w) in zip(distances, best, strict=True)]
         # where the factors are off, so is their smallest place, and the value there by the square of that
         off = self.factors.slack / math.sqrt(_ACCURATE)
