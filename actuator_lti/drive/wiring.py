@@ -142,7 +142,10 @@ class Drive:
 
 
 def wire(design: Design, operating: Operating | None = None) -> Drive:
-    """Wire a design up at an operating point it has; with the rotor locked the current loop remains."""
+    """Wire a design up at an operating point; with the rotor locked only the current loop remains.
+
+    Raises `InputError`: for stages that do not fit, or an operating point that the design does not have.
+    """
     at = (operating or Operating()).checked(design)
     control = design.controller
     if control.current is not None and not design.motor.has_electrical_dynamics:

@@ -25,7 +25,10 @@ class RateLimited:
 
 
 def rate_limited(amplitude: float, omega_rad_s: float, rate_limit: float) -> RateLimited:
-    """Describing function of a pure rate limit (model.md section 5; between the regimes an accepted fit)."""
+    """Describing function of a pure rate limit (model.md section 5; between the regimes an accepted fit).
+
+    ``amplitude``: peak of the command; ``rate_limit``: R, in the unit of the amplitude per second.
+    """
     x = omega_rad_s * amplitude / rate_limit
     if x <= 1.0:
         return RateLimited(x, "linear", 1.0, 0.0, amplitude)

@@ -140,7 +140,10 @@ def _prediction(loops: Loops, point: str, gain: float, limit: float, limiter: st
 
 
 def _oscillation_hz(loop: PeriodicLoop, gain: float) -> float:
-    """Where a gain brings a pole to the circle; over M updates the one of M at which it is next to -1."""
+    """At which frequency a loop oscillates at a gain that brings a pole to the unit circle.
+
+    A pole over M updates is that of M frequencies: the one at which ``gain L`` comes nearest to -1 is meant.
+    """
     poles = loop.modes(gain)
     angle = abs(float(np.angle(poles[int(np.argmin(np.abs(np.abs(poles) - 1.0)))])))
     count = len(loop.systems)

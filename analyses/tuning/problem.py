@@ -100,7 +100,10 @@ class Problem:
 
     @cached_property
     def all_corners(self) -> Floats:
-        """Nominal point, then corners of the tolerance box as they are correlated, (corners, factors)."""
+        """Nominal point, then the corners of the tolerance box, shape (corners, factors).
+
+        Correlated parameters move as they are correlated: two that are one go up and down together.
+        """
         size, nominal = len(self.factors), np.array([[f.nominal for f in self.factors]])
         if not size:
             return nominal
@@ -162,7 +165,10 @@ class Problem:
         return Population(self.design, self.values_at(gains, corners, factors), count)
 
     def values_at(self, gains: Floats, corners: Floats, factors: tuple[Factor, ...]) -> dict[str, Floats]:
-        """SI values of every candidate at every corner by key, (candidates * corners); gains about it."""
+        """SI values of every candidate at every corner by key, each of shape (candidates * corners).
+
+        A gain's tolerance is about the candidate, by the same share where it is in percent.
+        """
         chosen = {p: np.repeat(gains[:, k], len(corners)) for k, p in enumerate(self.paths)}
         moved = as_values(self.design, [f.path for f in factors], np.tile(corners, (len(gains), 1)))
         values = {**chosen, **moved}

@@ -204,7 +204,10 @@ def _filter(design: Design, element: Element) -> tuple[Filter, list[Variable]]:
 
 
 def change(variables: tuple[Variable, ...], values: Floats) -> Floats:
-    """Squares of ln ratios, of shares, of widths over frequency, from home, for rows in SI; (candidates,)."""
+    """How far values are from home: squares of ln ratios, of shares, and of widths over their frequency.
+
+    Of rows in SI, shape (candidates, variables); shape (candidates,).
+    """
     places = {v.path: k for k, v in enumerate(variables)}
     total = np.zeros(len(values))
     for k, item in enumerate(variables):
