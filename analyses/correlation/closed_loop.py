@@ -15,7 +15,6 @@ from analyses.correlation import driving
 from analyses.correlation.between_ticks import likeliest_s, signals_at
 from analyses.correlation.compare import SignalComparison, compare_signals
 from analyses.correlation.following import followed, following_finding
-from analyses.estimation.means import correlation_time
 from analyses.records.consistency import Finding, because, check_record
 from analyses.records.differentiation import filtered_motion
 from analyses.records.inputs import InputUse, account
@@ -186,18 +185,17 @@ def _nearest(
     readings = driving.readings(driving.needed_command(design, record, command), record)
     told: list[list[str]] = [list(notes) for _ in readings]
     tried = [_run_so(one, record, measured, own, progress) for one, own in zip(readings, told, strict=True)]
-    first = tried[0][2]
-    independent = sum(len(own) / correlation_time(own - first[name]) for name, own in measured.items())
-
-    def unlikely(k: int) -> float:
-        """Who finds more times has to be nearer (Schwarz, 1978), in rows that are independent."""
-        driven, _, series = tried[k]
-        misfit = np.log(max(_off(measured, series), 1e-300))
-        return float(independent * misfit + len(driven.first) * np.log(independent))
-
-    best = min(range(len(tried)), key=unlikely)
+    best = min(range(len(tried)), key=lambda k: _unlikely(tried[k], measured))
     notes[:] = told[best]
     return tried[best]
+
+
+def _unlikely(tried: _Modelled, measured: Mapping[str, Floats]) -> float:
+    """How far a reading is from the record: one that finds more times has to be nearer (Schwarz, 1978)."""
+    driven, _, series = tried
+    rows = len(next(iter(measured.values())))
+    misfit = np.log(max(_off(measured, series), 1e-300))
+    return float(rows * len(measured) * misfit + len(driven.first) * np.log(rows))
 
 
 def _run_so(

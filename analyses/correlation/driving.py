@@ -76,18 +76,19 @@ def readings(driven: Driven, record: Record) -> list[Driven]:
 
     Jumps in neighbouring rows are a curve or steps; a curve is smooth, or the drive takes it in straight
     lines or, as from a field bus, held until the next sample. Where the rows tell a grid on which it jumps,
-    it is held, and each jump on the grid or, of a sender that is not punctual, at any tick before its row.
+    it is held, and each jump on the grid or, of a sender that is not punctual, at any tick before its row
+    (where more than a tick is left to them: rows at all phases show that the jumps are on their grid).
     """
-    early, coarse = record.early_s, record.period_s > 1.5 * driven.design.controller.period_s
+    early, tick_s = record.early_s, driven.design.controller.period_s
     held = replace(driven, together=len(record), between=HELD)
     if (on_grid := _on_grid(held, record)) is not None:
-        found = [on_grid, held] if coarse else [on_grid]
+        found = [on_grid, held] if on_grid.hold and on_grid.hold.room_s > tick_s else [on_grid]
         if early is None:
             return found
         found = [replace(one, early_s=early[on_grid.steps]) for one in found]
         return found[:1] if on_grid.hold and on_grid.hold.holds(found[0].likely_s) else found[-1:]
     found = [driven, replace(driven, together=MOST_TOGETHER)]
-    if coarse:
+    if record.period_s > 1.5 * tick_s:
         found += [held, replace(driven, together=0, between=STRAIGHT)]
     other = [one for k, one in enumerate(found) if not k or len(one.steps) != len(found[k - 1].steps)]
     if early is not None:

@@ -38,6 +38,11 @@ class Hold:
         """When the first jump comes, by how much each is before its row."""
         return float(self.row_s * self.rows[0] - early_s[0])
 
+    @property
+    def room_s(self) -> float:
+        """How far a jump may be off the grid, as the rows see all of them."""
+        return self.latest_s - self.earliest_s
+
     def holds(self, early_s: Floats) -> bool:
         """Whether all jumps are on the grid, by how much each is before its row."""
         off = early_s - self.early_s(self.first_s(early_s))

@@ -84,7 +84,7 @@ def test_runs_of_years_histories_beyond_the_memory_and_millions_of_tones() -> No
     row = design_row(AMBER)
     row[at.TICKS] = 3e10
     with pytest.raises(NumericalError, match="3e\\+10 ticks"):
-        run_rows(row[None, :])
+        run_rows(row[None, :], np.zeros(0))
 
 
 LONG = [range(10**12), range(10**20), [range(10**12)], itertools.count(), ["x"] * 10**6]

@@ -25,7 +25,7 @@ BROKEN = {
     "reports.build:survey_loops": ("provenance",),
     "analyses.linear.loop_survey:_other_form": USUAL,
     "analyses.linear.loop_figures:_locked": ("margins", "loop-current"),
-    "analyses.linear.loop_survey:_break_points": USUAL,
+    "analyses.linear.loop_survey:_break_point": USUAL,
     "analyses.linear.loop_survey:operating_points": USUAL,
     "analyses.linear.loop_survey:_budgets": USUAL,
     "analyses.linear.loop_survey:_onset": USUAL,
