@@ -59,6 +59,7 @@ from actuator_lti.design.plant import (
     Temperature,
 )
 from actuator_lti.drawing import draw
+from actuator_lti.start.border import checks_arguments
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -117,6 +118,7 @@ class Design:
 
         return with_overrides(self, with_units(self, values))
 
+    @checks_arguments
     def add_filter(self, stage: str, **keys: Any) -> "Design":
         """A copy with one more filter, the last of its place.
 
@@ -134,6 +136,7 @@ class Design:
 
         return with_filter(self, stage, keys)
 
+    @checks_arguments
     def with_law(
         self, stage: str, system: Any, inputs: Sequence[str] | None = None, **settings: Any
     ) -> "Design":

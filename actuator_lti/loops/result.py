@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from actuator_lti.drawing import draw
 from actuator_lti.errors import InputError
+from actuator_lti.start.border import checks_arguments
 from actuator_lti.systems.as_control import as_control
 
 Form = Literal["sampled", "continuous", "ideal"]
@@ -185,6 +186,7 @@ class Loops:
         named = {"current": self.current, "velocity": self.velocity, "position": self.position}
         return {name: loop for name, loop in named.items() if loop is not None}
 
+    @checks_arguments
     def __getitem__(self, name: str) -> Loop:
         known = dict(self.items())
         if name not in known:

@@ -8,9 +8,10 @@ from collections.abc import Callable
 from functools import wraps
 from itertools import chain
 from types import FunctionType
-from typing import Any, TypeVar
+from typing import Any, TypeVar, cast
 
 Made = TypeVar("Made", bound=type)
+Method = TypeVar("Method", bound=Callable[..., Any])
 _GUARDED = set[Callable[..., Any]]()
 
 
@@ -44,6 +45,11 @@ def guarded(value: Any, room: str) -> Any:
     checked.__module__ = room  # where a pickle finds it
     _GUARDED.add(checked)
     return checked
+
+
+def checks_arguments(made: Method) -> Method:
+    """A method that first looks at its arguments."""
+    return cast(Method, _checked(made))
 
 
 def _checked(made: Callable[..., Any]) -> Callable[..., Any]:

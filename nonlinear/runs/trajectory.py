@@ -17,6 +17,7 @@ from actuator_lti.drawing import draw
 from actuator_lti.errors import InputError
 from actuator_lti.files.atomic import write_stream
 from actuator_lti.files.reading import shown
+from actuator_lti.start.border import checks_arguments
 from actuator_lti.start.extras import need
 from actuator_lti.types import Compared, Floats
 from nonlinear._kernels import layout as at
@@ -223,6 +224,7 @@ class Trajectory(Compared):
         """What to do about a status that is not ok."""
         return ADVICE[self.status]
 
+    @checks_arguments
     def limit_active(self, name: str) -> npt.NDArray[np.bool_]:
         """Rows in which a limiter acts; ``current`` not while the overload protection holds it down."""
         if name not in at.LIMITERS:
@@ -274,6 +276,7 @@ class Trajectory(Compared):
         frame.attrs = self._about
         return frame
 
+    @checks_arguments
     def to_csv(self, path: str | PathLike[str]) -> None:
         """Write a CSV file (comma, point, 17 digits; flags as 0 and 1); the header carries the units."""
         pa = need("pyarrow", "tables", "a CSV file of a run")
@@ -284,6 +287,7 @@ class Trajectory(Compared):
         )
         write_stream(path, lambda file: csv.write_csv(table, file, csv.WriteOptions(quoting_style="none")))
 
+    @checks_arguments
     def to_parquet(self, path: str | PathLike[str]) -> None:
         """Write a Parquet file, the design's name and the parameters' hash in its metadata."""
         pa = need("pyarrow", "tables", "a Parquet file")

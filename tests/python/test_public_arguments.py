@@ -36,6 +36,7 @@ from analyses.motion import Asked, motion
 from analyses.studies.sampling import sampler_of
 from analyses.validation import CHECKS
 from nonlinear import Reducers, Run, commands, simulate
+from tests.refusals import refused
 
 AMBER, FIN, SMALL = load_design("ilr33-amber"), load_design("fin"), load_design("ctms-motor-position")
 LAG, STEP = control.tf([1.0], [1.0, 1.0]), commands.step(0.01)
@@ -275,3 +276,12 @@ def test_names_texts_and_series_are_taken_where_they_answer() -> None:
     runs = [Run(design=design, command=STEP, duration_s=0.01) for design in (AMBER, "ilr33-amber")]
     by_design, by_name = nonlinear.simulate_many(runs).rows
     assert np.array_equal(by_design, by_name, equal_nan=True)
+
+
+@pytest.mark.parametrize("wrong", [wrong for wrong in WRONG if wrong != "text"])
+def test_methods_refuse_an_argument_of_another_kind(wrong: str) -> None:
+    """`Trajectory.to_csv(None)` was a TypeError of the file system, `loops[[]]` one of a dict."""
+    loops, drive = assemble_loops(SMALL), run()
+    for method in (loops.__getitem__, drive.limit_active, drive.to_csv, drive.to_parquet, AMBER.add_filter):
+        refused(method, WRONG[wrong])
+    refused(AMBER.with_law, WRONG[wrong], LAG)
