@@ -136,7 +136,6 @@ class Design:
 
         return with_filter(self, stage, keys)
 
-    @checks_arguments
     def with_law(
         self, stage: str, system: Any, inputs: Sequence[str] | None = None, **settings: Any
     ) -> "Design":
