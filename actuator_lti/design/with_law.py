@@ -76,7 +76,7 @@ def with_law(
             allowed = f"unknown{nearest(name, SETTINGS)}; allowed: {', '.join(SETTINGS)}"
             raise InputError(f"{name} = {shown(value)}: {allowed}")
     L, gain, every, method, continuous = {**SETTINGS, **settings}.values()
-    if stage not in LOOPS:
+    if not isinstance(stage, str) or stage not in LOOPS:
         raise InputError(f"stage = {shown(stage)}: allowed: {', '.join(LOOPS)}")
     control: Mapping[str, Any] = design_tree(design)["control"]
     present = [one for one in LOOPS if one in control]
