@@ -348,8 +348,7 @@ def _overrides(
             for name, number in numbers.items()
             if number != inf or name in given
         )
-        known = FIELDS[item.key]  # whose default, of a limit or of a time, says that there is none
-        if value == (nan if known.required else inf if known.default is None else known.default):
+        if value == _none(item.key):
             overrides[item.key] = None
             notes += [f"{stated}: none, {item.key} is left out"] if _says(base, item.key) else []
         elif value > 0.0 and isfinite(value):
@@ -359,6 +358,13 @@ def _overrides(
         else:
             notes.append(f"{stated}: not taken, {item.key} stays as it is")
     return overrides, used, notes
+
+
+def _none(key: str) -> float:
+    """The value of a limit or of a time that says that there is none; no number for what has to be there."""
+    known = FIELDS[key]
+    unsaid: float = inf if known.default is None else known.default
+    return nan if known.required else unsaid
 
 
 def _number(raw: object) -> float | None:

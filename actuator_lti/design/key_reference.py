@@ -49,9 +49,17 @@ def _entry(field: Field, structure: Structure) -> KeyEntry:
     unit = "of its quantity" if field.kind == "limit" else field.unit(structure)
     same: Tree = {item.name: getattr(field, item.name, None) for item in fields(KeyEntry)}
     default = "" if field.required or field.section == "design" else _default(field, unit)
-    above = "above 0" if field.low > 0 else "0 or more" if field.low == 0 else ""
-    words = "" if field.kind in ("text", "label") else above if field.high == BIG else field.allowed(unit)
-    return KeyEntry(**{**same, "unit": unit, "default": default, "allowed": words})
+    return KeyEntry(**{**same, "unit": unit, "default": default, "allowed": _allowed(field, unit)})
+
+
+def _allowed(field: Field, unit: str) -> str:
+    if field.kind in ("text", "label"):
+        return ""
+    if field.high != BIG:
+        return field.allowed(unit)
+    if field.low > 0:
+        return "above 0"
+    return "0 or more" if field.low == 0 else ""
 
 
 def _default(field: Field, unit: str) -> str:

@@ -1,6 +1,8 @@
 """The public border: an argument of another kind than its annotation says is refused in one line.
 
-A name taken from a package looks at its arguments; taken from the module that defines it, at nothing.
+The border is the package: a name taken from it looks at its arguments inside the house too; a function taken
+from the module that defines it looks at nothing, unless that module is public itself (`nonlinear.commands`).
+Methods look where they are marked.
 """
 
 import sys
@@ -11,7 +13,7 @@ from types import FunctionType
 from typing import Any, TypeVar, cast
 
 Made = TypeVar("Made", bound=type)
-Method = TypeVar("Method", bound=Callable[..., Any])
+Checked = TypeVar("Checked", bound=Callable[..., Any])
 _GUARDED = set[Callable[..., Any]]()
 
 
@@ -27,7 +29,7 @@ def asked(made: Made) -> Made:
     Traceback (most recent call last):
     actuator_lti.errors.InputError: width_m = '2 m': must be a number, in SI
     """
-    made.__init__ = _checked(made.__init__)  # type: ignore[misc]
+    made.__init__ = checks_arguments(made.__init__)  # type: ignore[misc]
     return made
 
 
@@ -41,18 +43,14 @@ def guarded(value: Any, room: str) -> Any:
     """A public name of a room; of a function one that first looks at its arguments."""
     if not isinstance(value, FunctionType) or value in _GUARDED:
         return value
-    checked = _checked(value)
+    checked = checks_arguments(value)
     checked.__module__ = room  # where a pickle finds it
     _GUARDED.add(checked)
     return checked
 
 
-def checks_arguments(made: Method) -> Method:
-    """A method that first looks at its arguments."""
-    return cast(Method, _checked(made))
-
-
-def _checked(made: Callable[..., Any]) -> Callable[..., Any]:
+def checks_arguments(made: Checked) -> Checked:
+    """A function or method that first looks at its arguments."""
     names = made.__code__.co_varnames[: made.__code__.co_argcount]
 
     @wraps(made)
@@ -62,4 +60,4 @@ def _checked(made: Callable[..., Any]) -> Callable[..., Any]:
         refuse_others(made, chain(zip(names, given, strict=False), named.items()))
         return made(*given, **named)
 
-    return checked
+    return cast(Checked, checked)

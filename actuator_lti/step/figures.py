@@ -79,11 +79,15 @@ def step_figures(system: Any) -> StepFigures:
         if (plain := plain_behind_delay(system)) is None:
             return _figures(*delayed_response(system))
         own, late = step_figures(plain[0]), plain[1]
-        return own if not late else replace(
-            own, settling_time_s=own.settling_time_s + late, peak_time_s=own.peak_time_s + late,
+        if not late:
+            return own
+        return replace(
+            own,
+            settling_time_s=own.settling_time_s + late,
+            peak_time_s=own.peak_time_s + late,
             time_s=np.concatenate(([0.0, late], own.time_s + late)),
             response=np.concatenate(([0.0, 0.0], own.response)),
-        )  # fmt: skip
+        )
     loop = rational_loop(system)
     return _figures(*rational_motion(system, loop), period_s=loop.period_s, notes=_notes(loop))
 

@@ -81,12 +81,13 @@ def readings(driven: Driven, record: Record) -> list[Driven]:
     """
     early, tick_s = record.early_s, driven.design.controller.period_s
     held = replace(driven, together=len(record), between=HELD)
-    if (on_grid := _on_grid(held, record)) is not None:
-        found = [on_grid, held] if on_grid.hold and on_grid.hold.room_s > tick_s else [on_grid]
+    row_s = float(record.time_s[-1] - record.time_s[0]) / max(len(record) - 1, 1)
+    if (hold := hold_of(held.steps, len(record), row_s, tick_s)) is not None:
+        on_grid, anywhere = _on_grid(held, hold), hold.room_s > tick_s
         if early is None:
-            return found
-        found = [replace(one, early_s=early[on_grid.steps]) for one in found]
-        return found[:1] if on_grid.hold and on_grid.hold.holds(found[0].likely_s) else found[-1:]
+            return [on_grid, held] if anywhere else [on_grid]
+        told = early[held.steps]
+        return [replace(held if anywhere and not hold.holds(told) else on_grid, early_s=told)]
     found = [driven, replace(driven, together=MOST_TOGETHER)]
     if record.period_s > 1.5 * tick_s:
         found += [held, replace(driven, together=0, between=STRAIGHT)]
@@ -97,15 +98,10 @@ def readings(driven: Driven, record: Record) -> list[Driven]:
     return [one for one in other if record.between in ("", one.between)] or [driven]
 
 
-def _on_grid(held: Driven, record: Record) -> Driven | None:
-    """A command that is held, with the tick that the rows tell by its steps; None where they tell none."""
-    control = held.design.controller
-    row_s = float(record.time_s[-1] - record.time_s[0]) / max(len(record) - 1, 1)
-    hold = hold_of(held.steps, len(record), row_s, control.period_s)
-    if hold is None:
-        return None
-    design = replace(held.design, controller=replace(control, period_s=hold.tick_s))
-    return replace(held, design=design, hold=hold)
+def _on_grid(held: Driven, hold: Hold) -> Driven:
+    """A command that is held, with the tick that the rows tell by its steps."""
+    control = replace(held.design.controller, period_s=hold.tick_s)
+    return replace(held, design=replace(held.design, controller=control), hold=hold)
 
 
 def command_names(design: Design) -> dict[str, str]:
