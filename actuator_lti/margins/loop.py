@@ -11,6 +11,7 @@ import numpy as np
 from scipy.linalg.lapack import dgebal
 
 from actuator_lti.margins.given import Given, given_of, unwarped
+from actuator_lti.systems.resolvent import LARGE, states_at
 from actuator_lti.types import Complex, Real
 
 _AT_MINUS_ONE = 1e-13
@@ -155,7 +156,11 @@ class RationalLoop:
             with np.errstate(all="ignore"):
                 above, below = horner(self._with_slopes[:2], p)
                 return np.asarray(above / below)
-        return np.asarray(self.d + np.linalg.solve(self._resolvent(p), self.b[:, None])[..., 0] @ self.c)
+        if min(self.order, p.size) >= LARGE:
+            states = states_at(self._state, self.b[:, None], p)
+        else:
+            states = np.linalg.solve(self._resolvent(p), self.b[:, None])
+        return np.asarray(self.d + states[..., 0] @ self.c)
 
     def _resolvent(self, p: Complex) -> Complex:
         n = self.order
