@@ -147,7 +147,7 @@ def peaks(system: Any, delay_s: Delay = 0.0) -> Peaks:
 
 
 def _behind_delay(given: Given, delay_s: float) -> list[Place]:
-    """By the certified zeros and poles; a continuous loop where these leave a doubt by certified intervals."""
+    """By certified zeros and poles; where these leave a doubt of a continuous loop by certified intervals."""
     try:
         return late_distances(given, delay_s, _PEAKS)
     except Doubtful:
