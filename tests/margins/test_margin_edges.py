@@ -115,8 +115,7 @@ def test_a_mode_that_a_gain_behind_part_of_a_sample_does_not_show(pole: float, g
     if not gain:
         assert stability_margins(control.tf([0.0], [1.0, 1.0]), delay_s=0.03, certify=True).stable
         assert unwrapped_phase_deg(loop, [1.0]) == [0.0]
-        with pytest.raises(NumericalError):
-            peaks(loop, 0.03)
+        assert peaks(loop, 0.03) == peaks(loop)
 
 
 def test_disagreement_gives_no_figure() -> None:
