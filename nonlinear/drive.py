@@ -134,6 +134,12 @@ class Drive:
             raise InputError(f"state = {shown(state)}: must be finite", where=self.design.name)
         self._s[:] = given
 
+    def set_motion(self, state: Floats) -> None:
+        """Go on from the motion in a state of another drive with this motor, load and delay."""
+        end = at.S_QUEUE + int(self._p[at.DELAY_LINE])
+        self._s[:end] = numbers_of("state", state)[:end]
+        self._s[[at.S_UNTIL_OUTER, at.S_UNTIL_VELOCITY]] = 0.0  # its stages are updated at the next tick
+
     def value(self, name: str) -> float:
         """A number of the state by its name in `STATE_NAMES`."""
         if name not in STATE_NAMES:

@@ -2,9 +2,7 @@
 
 import cmath
 import math
-from collections.abc import Callable
 from dataclasses import replace
-from functools import partial
 from typing import Any
 
 import flint
@@ -15,15 +13,17 @@ from actuator_lti.bandwidth.measured import measured_bandwidth
 from actuator_lti.bandwidth.rational_response import RationalResponse
 from actuator_lti.bandwidth.results import SQUARES, Bandwidth, Level, Peaks
 from actuator_lti.errors import InputError, delay_number
-from actuator_lti.margins.along import Along
+from actuator_lti.margins.assemble import Place
 from actuator_lti.margins.axis_search import half_turn
-from actuator_lti.margins.delays.form import delay_form, in_series
-from actuator_lti.margins.distances import COMPLEMENTARY, INVERSE, MODULUS, Distance
+from actuator_lti.margins.delays.form import DelayForm, delay_form, in_series
+from actuator_lti.margins.distances import COMPLEMENTARY, INVERSE, MODULUS
 from actuator_lti.margins.exact.crossings import smallest
 from actuator_lti.margins.exact.loop import exact_loop, exact_polynomials
+from actuator_lti.margins.exact.product import late_distances
 from actuator_lti.margins.factored import factored
 from actuator_lti.margins.given import Given, given_of, of_scipy, unwarped, whole_samples
 from actuator_lti.margins.loop import RationalLoop, loop_of, rational_loop
+from actuator_lti.margins.trust import Doubtful
 from actuator_lti.measured.response import is_measured
 from actuator_lti.systems.delay_response import DelayResponse, plain_behind_delay
 from actuator_lti.systems.exact_response import dc_noise, shown
@@ -35,6 +35,7 @@ _FLOOR = 1e-6  # of the gain at zero frequency: the phase is followed down to it
 _TAKEN = flint.fmpq(1, 1000)
 _AT_NYQUIST = 1e8  # of the largest root: next to nothing is left of the half circle
 _NEAR = 1e-4  # relative: a crossing of the factors and one of the loop
+_PEAKS = MODULUS, COMPLEMENTARY
 _POLE = "the response has a pole at zero frequency: it is no closed loop with a bandwidth"
 _NO_GAIN = "DC gain is 0: no -3 dB bandwidth (the response is zero at zero frequency)"
 
@@ -132,26 +133,36 @@ def peaks(system: Any, delay_s: Delay = 0.0) -> Peaks:
         raise InputError(
             "measured data: the peak of S is 1 over stability_margins(L).modulus_margin, in its range"
         )
-    if hasattr(system, "delays_s") and not system.delays_s.size:
-        system = system.to_state_space()
     if hasattr(system, "delays_s"):
-        return _peaks(DelayResponse.of(delay_form(system, delay_s)).smallest, None)
+        if (plain := plain_behind_delay(system, delay_s)) is None:
+            return _peaks(_inside_delays(delay_form(system, delay_s)), None)
+        system, delay_s = plain
     given = given_of(system)
     period_s = given.period_s
-    if delay_s and period_s is None:
-        return _peaks(DelayResponse.of(in_series(loop_of(given), delay_s)).smallest, None)
-    whole = whole_samples(delay_s / period_s) if period_s else 0
+    whole = whole_samples(delay_s / period_s) if period_s else None if delay_s else 0
     if whole is None:
-        late = loop_of(given, warp=True).behind(delay_s)
-        with np.errstate(all="ignore"):
-            along = Along(factored(late), late, None)
-        return _peaks(lambda distance: along.nearest((distance,))[0], period_s)
+        return _peaks(_behind_delay(given, delay_s), period_s)
     loop = exact_loop(replace(given, samples=whole))
-    return _peaks(partial(smallest, loop.N, loop.D), period_s)
+    return _peaks([smallest(loop.N, loop.D, distance) for distance in _PEAKS], period_s)
 
 
-def _peaks(smallest_of: Callable[[Distance], tuple[float, float]], period_s: float | None) -> Peaks:
-    (s_value, s_w), (t_value, t_w) = smallest_of(MODULUS), smallest_of(COMPLEMENTARY)
+def _behind_delay(given: Given, delay_s: float) -> list[Place]:
+    """By certified zeros and poles; where these leave a doubt of a continuous loop by certified intervals."""
+    try:
+        return late_distances(given, delay_s, _PEAKS)
+    except Doubtful:
+        if given.period_s is not None:
+            raise
+        return _inside_delays(in_series(loop_of(given), delay_s))
+
+
+def _inside_delays(form: DelayForm) -> list[Place]:
+    response = DelayResponse.of(form)
+    return [response.smallest(distance) for distance in _PEAKS]
+
+
+def _peaks(places: list[Place], period_s: float | None) -> Peaks:
+    (s_value, s_w), (t_value, t_w) = places
     return Peaks(_db(s_value), unwarped(s_w, period_s), _db(t_value), unwarped(t_w, period_s))
 
 

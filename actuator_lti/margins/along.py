@@ -173,7 +173,7 @@ class Along:
         if not factors.at_zero < 0.0:
             return 0.0, _leaving(1.0 + self.ends[0].real, found.rate)
         low = float(found.known[0, 0])
-        on_real, on_axis = self.loop.at_real(low), complex(self.loop.at(np.array([low]))[0])
+        on_real, on_axis = self.loop.beside_zero(low)
         gain, phase = factors.log_at(low)
         if not abs(on_axis * cmath.exp(complex(-gain, -phase)) - 1.0) <= SAME:  # integrators that cancel
             raise Doubtful("poles and zeros do not make up the loop next to zero frequency")

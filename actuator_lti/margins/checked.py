@@ -62,15 +62,20 @@ def _closed(loop: RationalLoop) -> Real:
 
 def _refuse(loop: RationalLoop, delay_s: float) -> None:
     if delay_s:
-        if loop.period_s is None and abs(loop.d) >= 1.0:
-            raise InputError(
-                f"a direct feed-through of {loop.d:.6g} behind a delay: the gain never falls below one, and "
-                "the closed loop of neutral type has no margins"
-            )
+        refuse_neutral(loop)
         if not loop.order and not loop.d:
             raise Doubtful("no loop")
     elif not loop.order or not loop.b.any() or not loop.c.any() or abs(1.0 + loop.d) <= _NEAR_ONE:
         raise Doubtful("the loop has no dynamics, or 1 + L(infinity) is next to zero")
+
+
+def refuse_neutral(loop: RationalLoop) -> None:
+    """Refuse a continuous loop that behind a delay would be closed to one of neutral type."""
+    if loop.period_s is None and abs(loop.d) >= 1.0:
+        raise InputError(
+            f"a direct feed-through of {loop.d:.6g} behind a delay: the gain never falls below one, and "
+            "the closed loop of neutral type has no margins"
+        )
 
 
 def _poles_behind_delay(loop: RationalLoop, gain_w: Real) -> int | None:

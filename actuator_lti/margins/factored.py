@@ -14,7 +14,6 @@ from actuator_lti.types import Complex, Real
 
 _LEAST_SLACK = 1e-8
 SAME = 1e-4  # relative: the loop and the product of its factors
-_NEARLY_REAL = 1e-12
 _SEEN = math.log(1e10)  # of L, to either side of one
 _NEWTON_STEPS = 6
 _NEWTON_STEP, _NEWTON_STEP_ON_L = 1e-9, 1e-6  # relative
@@ -100,24 +99,44 @@ def _in_s(loop: RationalLoop, points: Complex) -> Complex:
 
 
 def _zeros(loop: RationalLoop, poles: Complex) -> Complex:
-    """Zeros in the s-plane; those of a state space that lie at infinity come out far away."""
+    """Zeros in the s-plane; of a state space in z those at infinity too, at s = 1."""
     if loop.coefficients is not None:
         return _in_s(loop, polynomial_roots(loop.coefficients[0]))
+    A, b, c, d, at_infinity = _without_infinite_zeros(loop)
     size = np.abs(poles[poles != 0.0])
     shift = 1.083 * math.exp(float(np.log(size).mean())) if size.size else 1.083
-    eye = np.eye(loop.order)
     # sigma = 1/(s - shift): L = l - c inverse (sigma - W)^-1 inverse b, whose zeros are plain eigenvalues
     scale = 1.0 - shift if loop.in_z else 1.0
-    inverse = np.linalg.inv(scale * loop.A - ((1.0 + shift) if loop.in_z else shift) * eye)
-    W, size = (inverse + loop.A @ inverse, 2.0) if loop.in_z else (inverse, 1.0)
-    b, c = inverse @ loop.b, loop.c @ inverse
-    if not (there := loop.d - scale * float(loop.c @ b)):
+    inverse = np.linalg.inv(scale * A - ((1.0 + shift) if loop.in_z else shift) * np.eye(b.size))
+    W, size = (inverse + A @ inverse, 2.0) if loop.in_z else (inverse, 1.0)
+    there, b, c = d - scale * float(c @ inverse @ b), inverse @ b, c @ inverse
+    if not there:
         raise Doubtful("the loop is zero where its zeros are looked for from")
     sigma = eigenvalues(W + np.outer((size / there) * b, c))
     zeros = shift + 1.0 / sigma[sigma != 0.0]
-    if loop.in_z or loop.d or zeros.size < loop.order:
-        return zeros
-    # without feed-through one is at infinity, with its mirror image where two
-    farthest = np.abs(zeros).argmax()
-    real = abs(zeros[farthest].imag) <= _NEARLY_REAL * abs(zeros[farthest])
-    return np.delete(zeros, np.abs(zeros).argsort()[-1 if real else -2 :])
+    return np.append(zeros, np.ones(at_infinity)) if loop.in_z else zeros
+
+
+def _without_infinite_zeros(loop: RationalLoop) -> tuple[Real, Real, Real, float, int]:
+    """A, b, c, d with the finite zeros of a state space and a feed-through d; how many are at infinity.
+
+    Without d the output is zero only while c x = 0. A reflection of the states that c holds (the others stay,
+    so a zero entry stays one) makes c x one state; it goes, and its rate is the output in place of it
+    (Emami-Naeini, Van Dooren, Computation of zeros of linear multivariable systems, Automatica 18, 1982).
+    """
+    A, b, c, d, count = loop.A, loop.b, loop.c, loop.d, 0
+    while not d:
+        if not (held := c.nonzero()[0]).size:
+            raise Doubtful("nothing passes through the loop")
+        k = int(np.abs(c[held]).argmax())
+        v, size = c[held], float(np.copysign(np.linalg.norm(c), c[held[k]]))
+        v[k] += size
+        v *= math.sqrt(2.0) / np.linalg.norm(v)
+        A, b = A.copy(), b.copy()
+        A[held] -= np.outer(v, v @ A[held])
+        A[:, held] -= np.outer(A[:, held] @ v, v)
+        b[held] -= v * float(v @ b[held])
+        gone, rest = held[k], np.arange(b.size) != held[k]
+        c, d = -size * A[gone, rest], -size * float(b[gone])
+        A, b, count = A[np.ix_(rest, rest)], b[rest], count + 1
+    return A, b, c, d, count

@@ -105,7 +105,7 @@ def given_of(system: Any) -> Given:
     period_s = period_of(system)
     if hasattr(system, "num"):
         parts = (np.asarray(part[0][0], dtype=float) for part in (system.num, system.den))
-        num, den = (np.trim_zeros(part, "f") for part in parts)
+        num, den = (part[(part != 0.0).cumsum() > 0] for part in parts)
         if not den.size:
             raise InputError("the denominator of the loop is zero")
         if num.size > den.size:

@@ -11,6 +11,7 @@ import numpy as np
 from scipy.linalg.lapack import dgebal
 
 from actuator_lti.margins.given import Given, given_of, unwarped
+from actuator_lti.systems.resolvent import LARGE, states_at
 from actuator_lti.types import Complex, Real
 
 _AT_MINUS_ONE = 1e-13
@@ -66,11 +67,11 @@ class RationalLoop:
         x = self.x(w)
         return self.late(x, self._values(self._variable(x)))
 
-    def at_real(self, w: float) -> float:
-        """L without the delay at a real s next to zero."""
-        p = np.array([math.exp(2.0 * math.atan(w)) if self.in_z else w], dtype=complex)
-        p -= 1.0 if self._about_one else 0.0
-        return float(self._values(p)[0].real)
+    def beside_zero(self, w: float) -> tuple[float, complex]:
+        """L without the delay at a real s = w next to zero, and L at j w."""
+        x = self.x(np.array([w]))
+        L = self._values(self._variable(np.concatenate((x, -1j * x))))
+        return float(L[1].real), complex(self.late(x, L[:1])[0])
 
     def at_rest(self) -> complex:
         """L at zero frequency; by matrices refined once, so that states which are 0 there add no rounding."""
@@ -155,7 +156,11 @@ class RationalLoop:
             with np.errstate(all="ignore"):
                 above, below = horner(self._with_slopes[:2], p)
                 return np.asarray(above / below)
-        return np.asarray(self.d + np.linalg.solve(self._resolvent(p), self.b[:, None])[..., 0] @ self.c)
+        if min(self.order, p.size) >= LARGE:
+            states = states_at(self._state, self.b[:, None], p)
+        else:
+            states = np.linalg.solve(self._resolvent(p), self.b[:, None])
+        return np.asarray(self.d + states[..., 0] @ self.c)
 
     def _resolvent(self, p: Complex) -> Complex:
         n = self.order

@@ -5,9 +5,10 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.linalg.lapack import dgeev
+from scipy.sparse.csgraph import connected_components
 
 from actuator_lti.errors import NumericalError
-from actuator_lti.types import Complex, Mask, Real
+from actuator_lti.types import Complex, Ints, Mask, Real
 
 _EPS = float(np.finfo(float).eps)
 _SHARP = 1e-3  # a border pole's error, over its modulus
@@ -67,7 +68,27 @@ def all_sorted(matrices: Sequence[Real], in_z: bool) -> list[SortedPoles]:
     distance: Real = np.abs(values) - 1.0 if in_z else values.real
     radius[values == centre] = 0.0
     near = np.abs(distance) <= _SAFE * radius
-    return [_sorted(*each, centre) for each in zip(values, radius, distance, near, strict=True)]
+    found = (_sorted(*each, centre) for each in zip(values, radius, distance, near, strict=True))
+    return [_by_parts(A, in_z, one) if one.doubtful else one for A, one in zip(matrices, found, strict=True)]
+
+
+def diagonal_blocks(A: Real) -> list[Ints]:
+    """States that act upon each other, directly or not: those of a chain of delays act one way alone."""
+    count, label = connected_components(A != 0.0, connection="strong")
+    return [np.flatnonzero(label == k) for k in range(count)]
+
+
+def _by_parts(A: Real, in_z: bool, whole: SortedPoles) -> SortedPoles:
+    """The same by the blocks on the diagonal, if there are several: what is zero beside them is so exactly.
+
+    Each state of a chain of delays is such a block; together they are one defective eigenvalue.
+    """
+    if len(blocks := diagonal_blocks(A)) == 1:
+        return whole
+    parts = [all_sorted((A[np.ix_(own, own)],), in_z)[0] for own in blocks]
+    unstable, border, at_dc = np.sum([(part.unstable, part.border, part.at_dc) for part in parts], axis=0)
+    values, doubtful = np.concatenate([p.values for p in parts]), any(p.doubtful for p in parts)
+    return SortedPoles(values, int(unstable), int(border), int(at_dc), doubtful)
 
 
 def _sorted(values: Complex, radius: Real, distance: Real, near: Mask, centre: float) -> SortedPoles:

@@ -19,10 +19,12 @@ from actuator_lti.drive.profile import profile_passes_rad_s
 from actuator_lti.drive.steady import motor_torque_Nm
 from actuator_lti.errors import InputError
 from actuator_lti.loops import assemble_loops
+from actuator_lti.types import Floats
 from analyses.failures.asked import NEAR_SHARE, Asked
 from analyses.large_signal.tones import full_command
 from analyses.linear.loop_figures import all_loop_figures
-from nonlinear import Drive, State
+from nonlinear import Drive, Rows, State
+from nonlinear.runs.running import Piece, Running
 from nonlinear.runs.trajectory import COMMAND_UNITS
 
 Sensing = Callable[[State], State]
@@ -71,13 +73,23 @@ class Rig:
         rigid = self.design.coupling is None
         return self.plant.value("angle") / self.design.total_ratio if rigid else self.plant.value("output")
 
-    @property
-    def followed(self) -> float:
-        """What the command orders, at t_k: position or speed at the output, current, voltage."""
-        true, stage = self.measured(), self.design.controller.outermost
-        speed = true.motor_speed_rad_s / self.design.total_ratio
-        other = {"velocity": speed, "current": true.current_A, "voltage": true.voltage_V}
-        return other.get(stage, self.output_rad)
+    def whole(self, command: float) -> Running:
+        """The drive as one, from rest, under a command that stays: the rig before a failure, bit for bit."""
+        rows = Rows.of(replace(self.design, instruments=Instruments()))
+        rows["load"] = self.load_Nm
+        rows.step("command", command)
+        return rows.running()
+
+    def go_on_from(self, whole: Running) -> None:
+        """Take over the state of the drive as one."""
+        self.controller.set(whole.s)
+        self.plant.set_motion(whole.s)
+
+    def followed(self, piece: Piece) -> Floats:
+        """What the command orders, at each tick: position or speed at the output, current, voltage."""
+        places = {"velocity": 2, "current": 3, "voltage": 4}
+        seen = piece.columns[places.get(stage := self.design.controller.outermost, 1)]
+        return seen / self.design.total_ratio if stage == "velocity" else seen
 
     @property
     def turning(self) -> dict[str, str]:

@@ -10,7 +10,7 @@ from actuator_lti.asked.verdict import Verdict
 from actuator_lti.design.loader import AnyDesign, as_design
 from actuator_lti.design.model import Design
 from actuator_lti.drive.operating import follows_angle, runs, straight
-from actuator_lti.errors import InputError, UnstableError
+from actuator_lti.errors import InputError, NumericalError, UnstableError
 from actuator_lti.loops import assemble_loops
 from actuator_lti.loops.stiffness import compliance
 from actuator_lti.types import Floats
@@ -19,6 +19,7 @@ from analyses.failures.cases import Case, Rig, cases_of
 from analyses.motion.settling import Settling, counted, outcome, settle
 from analyses.specification.capability import drive_figures
 from analyses.specification.requirements import RequirementVerdict, judged_by, tally
+from nonlinear.runs.trajectory import ADVICE
 
 
 @dataclass(frozen=True)
@@ -146,13 +147,15 @@ def _worse(first: FailureCase, second: FailureCase) -> FailureCase:
 
 def _hold(rig: Rig, start: float, wait: int, most: int, swing: float) -> None:
     """Hold a start until what it orders spans over ``wait`` ticks `SETTLED` of its size beside its swing."""
+    whole = rig.whole(start)
     for _ in range(0, most, wait):
-        seen = list[float]()
-        for _ in range(wait):
-            rig.step(start)
-            seen.append(rig.followed)
+        piece = whole.advance(wait)
+        if piece.status != "ok":
+            raise NumericalError(f"before a failure ({piece.status}): {ADVICE[piece.status]}")
+        seen = rig.followed(piece)
         if np.ptp(seen) <= SETTLED * abs(seen[-1]) + swing:
-            return
+            break
+    rig.go_on_from(whole)
 
 
 def _settling_s(design: Design, asked: Asked) -> float:

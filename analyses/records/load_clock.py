@@ -4,7 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 from numpy.polynomial.legendre import legvander
-from scipy.signal import correlate
+from scipy.fft import irfft, next_fast_len, rfft
+from scipy.linalg import solve_triangular
 from scipy.stats import chi2
 
 from actuator_lti.errors import InputError
@@ -69,9 +70,12 @@ def _against_the_best(current: Floats, load: Floats) -> tuple[Floats, float]:
     Shapes (n,) and (m,), m > n; the ratios have shape (m - n + 1,).
     """
     n, load, total = len(current), load - load.mean(), float(current @ current)
-    waves = np.linalg.qr(legvander(np.linspace(-1.0, 1.0, n), min(ORDERS, n) - 1))[0].T
+    columns = legvander(np.linspace(-1.0, 1.0, n), min(ORDERS, n) - 1)
+    waves = solve_triangular(np.linalg.qr(columns, mode="r"), columns.T, trans="T")
     drift, squares, own = slow_shares(len(waves)), np.append(0.0, np.cumsum(load**2)), waves @ current
-    placed = np.array([correlate(load, one, mode="valid", method="fft") for one in [*waves, current]])
+    size = next_fast_len(len(load), real=True)  # what wraps around is not among the places
+    spectra = rfft(load, size) * rfft(np.vstack([waves, current]), size).conj()
+    placed = irfft(spectra, size)[:, : len(load) - n + 1]
     power = squares[n:] - squares[:-n] - drift @ placed[:-1] ** 2
     beside = np.maximum(placed[-1] - (drift * own) @ placed[:-1], 0.0)
     seen = power > ROUNDING * squares[-1]

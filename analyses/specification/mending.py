@@ -20,6 +20,7 @@ from analyses.tuning.problem import GAINS, SPAN
 from analyses.tuning.start import allowed_range
 
 STEPS = 36  # on either side, and once more between the last that does not mend and the first that does
+AT_ONCE = 12  # values
 
 
 @dataclass(frozen=True)
@@ -80,9 +81,12 @@ def _ways(design: Design) -> Iterator[tuple[str, float, float]]:
 
 def _first(points: Sequence[Sequence[View]], design: Design, path: str, values: np.ndarray) -> int | None:
     """Which value is the first within the limits of all views; after one point each is asked by itself."""
-    left = np.flatnonzero(_reserves(points[0], design, path, values).min(axis=0) >= 0.0)
-    mends = (k for k in left if all(_reserves(p, design, path, values[[k]]).min() >= 0.0 for p in points[1:]))
-    return next(map(int, mends), None)
+    for start in range(0, len(values), AT_ONCE):
+        some = values[start : start + AT_ONCE]
+        for k in np.flatnonzero(_reserves(points[0], design, path, some).min(axis=0) >= 0.0):
+            if all(_reserves(other, design, path, some[[k]]).min() >= 0.0 for other in points[1:]):
+                return start + int(k)
+    return None
 
 
 def _by_point(views: Iterable[View]) -> list[list[View]]:

@@ -111,7 +111,8 @@ class _Watch:
     extents: list[tuple[Floats, Floats]] = field(default_factory=list)  # per piece, of followed and motor
     ranges: list[tuple[Floats, Floats]] = field(default_factory=list)  # per piece, of _RANGED
     acted: list[tuple[int, int, int]] = field(default_factory=list)  # entries, flags, events
-    left: list[Floats] = field(default_factory=list)  # per piece, of each breakaway: `_breakaways`
+    left: list[Floats] = field(default_factory=list)  # of each breakaway: `_breakaways`
+    looked: int = 0  # pieces in which breakaways were looked for
     leaps: int = 0  # over waits
     scales: drift.Scales = field(init=False)
     period_s: float = field(init=False)
@@ -159,20 +160,23 @@ class _Watch:
         ranged = piece.columns[_RANGED]
         self.ranges.append((ranged.min(axis=1), ranged.max(axis=1)))
         self.scales.take(self.drive, piece)
-        self.left.append(self._breakaways())
         return piece
 
     def _breakaways(self) -> Floats:
-        """Time, entry, place (followed, motor), direction: a column for each breakaway in the last piece."""
+        """Time, entry, place (followed, motor), direction: a column for each breakaway so far."""
         # it stands while it moves no further in an entry than its share of what a window may (`drift.small`)
-        times, seen = np.concatenate(self.times[-2:]), np.concatenate(self.seen[-2:], axis=1)
-        new = max(times.size - self.times[-1].size - 2, 0)  # whether the last entry before left is known now
-        times, places = times[new:], seen[1:, new:]
+        known = max(self.looked - 1, 0)
+        times, seen = np.concatenate(self.times[known:]), np.concatenate(self.seen[known:], axis=1)
+        new = max(self.times[known].size - 2, 0) if self.looked else 0  # the last entry is judged now
+        first, times, places = sum(map(len, self.times[:known])) + new, times[new:], seen[1:, new:]
         steps = np.diff(places, axis=1)
         moves = np.abs(steps).max(axis=0) > self._least / drift.DRIFT
         last = np.flatnonzero(moves[1:] & ~moves[:-1]) + 1
-        entries = sum(one[0] for one in self.acted) - times.size + last
-        return np.stack([times[last], entries, *places[:, last], np.sign(steps[:, last].sum(axis=0))])
+        self.left.append(
+            np.stack([times[last], first + last, *places[:, last], np.sign(steps[:, last].sum(axis=0))])
+        )
+        self.looked = len(self.times)
+        return np.concatenate(self.left, axis=1)
 
     @property
     def spent(self) -> bool:
@@ -245,7 +249,7 @@ class _Watch:
     def _returns(self) -> tuple[_Swing, int] | None:
         """The swing between breakaways from one place one way, and its first entry; None: not known."""
         # as near as a count of the sensors, or `STILL` of the largest angle, is the same place
-        p, left = self.drive.p, np.concatenate(self.left, axis=1)
+        p, left = self.drive.p, self._breakaways()
         counts = p[at.COUNTS_PER_RAD] * p[at.RATIO], p[at.POSITION_COUNTS]
         far = max([self._least, *(1.0 / each for each in counts if each > 0.0)])
         near = np.abs(left[2:4] - left[2:4, -1:]).max(axis=0, initial=0.0) <= far

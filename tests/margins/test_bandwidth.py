@@ -67,13 +67,19 @@ def test_closed_loop_of_an_integrator_with_delay() -> None:
     assert b.minus90deg_rad_s == pytest.approx(omega[np.argmax(phase < -np.pi / 2)], rel=1e-5)
 
 
-@pytest.mark.parametrize(
-    ("loop", "delay_s"), [(control.tf([25], [1, 10, 10, 10]), 0.0), (100 / s, 0.005), (SECOND * 5, 0.002)]
-)
+@pytest.mark.parametrize(("loop", "delay_s"), [
+    (control.tf([25], [1, 10, 10, 10]), 0.0),
+    (100 / s, 0.005),
+    (SECOND * 5, 0.002),
+    (control.tf([0.5], [1, -1], 1e-3), 0.5e-3),  # behind half a sample
+    (control.tf([0.3, 0.1], [1, -0.4], 1e-3), 1.3e-3),
+    ((0.5 * s + 300) / (s + 200), 0.02),  # with a feed-through
+    (SECOND, 0.003),  # |L| is one at rest
+])  # fmt: skip
 def test_peaks_of_S_and_T(loop: control.TransferFunction, delay_s: float) -> None:
     result = peaks(loop, delay_s=delay_s)
-    omega = np.geomspace(0.1, 2000, 800_001)
-    L = loop(1j * omega) * np.exp(-1j * omega * delay_s)
+    omega = np.geomspace(0.1, 1000 * np.pi if loop.dt else 2000, 800_001)
+    L = loop(np.exp(1j * omega * loop.dt) if loop.dt else 1j * omega) * np.exp(-1j * omega * delay_s)
     S, T = np.abs(1 / (1 + L)), np.abs(L / (1 + L))
     assert result.sensitivity_db == pytest.approx(20 * math.log10(S.max()), abs=1e-6)
     assert result.complementary_db == pytest.approx(20 * math.log10(T.max()), abs=1e-6)

@@ -115,8 +115,7 @@ def test_a_mode_that_a_gain_behind_part_of_a_sample_does_not_show(pole: float, g
     if not gain:
         assert stability_margins(control.tf([0.0], [1.0, 1.0]), delay_s=0.03, certify=True).stable
         assert unwrapped_phase_deg(loop, [1.0]) == [0.0]
-        with pytest.raises(NumericalError):
-            peaks(loop, 0.03)
+        assert peaks(loop, 0.03) == peaks(loop)
 
 
 def test_disagreement_gives_no_figure() -> None:
@@ -335,3 +334,22 @@ def test_zeros_far_slower_than_the_poles_are_those_of_the_loop() -> None:
     ):
         (margin,) = m.gain_margins
         assert (margin.frequency_rad_s, margin.ratio) == pytest.approx((float(at), float(ratio)), rel=1e-6)
+
+
+@pytest.mark.parametrize("inside", [False, True])
+def test_a_loop_with_a_hundred_samples_of_delay_as_states_is_checked(inside: bool) -> None:
+    """Its chain is one defective pole at z = 0, and zeros at infinity; ``inside``: within an inner loop."""
+    samples, gain, inner = 100, 2.0**-9, 2.0**-9
+    n = samples + 2
+    A = np.eye(n, k=-1)
+    A[0, 0] = A[-1, -1] = 1.0  # an integrator, the chain, another integrator
+    A[0, samples] = -inner * inside
+    b, c = np.eye(n)[:, :1], gain * inner * np.eye(n)[-1:]
+    if not inside:
+        A, b, c = A[:-1, :-1], b[:-1], 0.5 * gain * np.eye(n - 1)[-1:]
+    den = np.zeros(samples + 2)
+    den[:2], den[-1] = (1.0, -1.0), inner * inside
+    expected = truth_of(control.tf([c.max()], np.polymul(den, [1.0, -1.0]) if inside else den, 1.0))
+    m = stability_margins(control.StateSpace(A, b, c, [[0.0]], 1.0))
+    assert m.evidence == "checked"
+    assert difference(m, expected) is None

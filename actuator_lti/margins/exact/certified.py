@@ -43,9 +43,9 @@ def certified_margins(given: Given, band_rad_s: tuple[float, float] | None = Non
     poles, hidden, figures = _poles(given, loop, others), loop.hidden_modes, None
     found = Shared((), (), problem=poles.problem)
     if poles.problem is None:
-        found = shared(*(crossings(each) for each in (loop, *others)))
+        found = shared(*(crossings(each, loop) for each in (loop, *others)))
         if found.problem is not None:
-            found = shared(*(crossings(each, merge=True) for each in (loop, *others)))
+            found = shared(*(crossings(each, loop, merge=True) for each in (loop, *others)))
     if found.problem is None:
         figures = Figures(found.gains, found.reals, [smallest(loop.N, loop.D, d) for d in (MODULUS, DISK)])
     if poles.hidden > hidden.at_zero:  # one that the data do not tell from a mode at zero

@@ -2,6 +2,8 @@
 
 import math
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cached_property, lru_cache, partial
 from itertools import pairwise
 
 import numpy as np
@@ -25,31 +27,81 @@ _NEAR = 1e-3  # relative: a pair this close may be a touch
 _ZERO = 1e-18  # of a distance
 
 
-def crossings(loop: ExactLoop, merge: bool = False) -> tuple[tuple[Crossing, ...], tuple[Crossing, ...]]:
-    """Every crossing of the unit circle, and of the negative real axis.
+@dataclass(frozen=True)
+class _Line:
+    """Where a loop meets the unit circle, or the real axis: at the positive roots of a polynomial in w^2."""
 
-    With ``merge`` a gain within `TOUCH` of one at an end of the axis is one, which is no crossing; between
-    two crossings L that stays so close to the line only touches it in any case.
-    """
+    N: Split
+    D: Split
+    p: fmpz_poly
+    off: Callable[[Split, Split, arb], arb]  # the distance to the line
+
+    @cached_property
+    def turns(self) -> list[arb]:
+        """Where the loop may just miss the line; not looked for where few roots are found all at once.
+
+        A miss is a pair of complex roots, with a turn of p between, or of its slope where a root lies beside.
+        """
+        slope = self.p.derivative()
+        both = () if self.p.degree() <= FEW else (slope, slope.derivative())
+        with ctx.workprec(_TURN_BITS):
+            return [v.mid() for q in both for v, _ in positive_roots(q)]
+
+    def met(self, turns: Sequence[arb], touched_ends: Sequence[bool] = (False, False)) -> list[Crossing]:
+        """The roots, touches merged."""
+        few, bits = self.p.degree() <= FEW, _FIRST_BITS + self.p.degree()
+        with ctx.workprec(bits):
+            missed = few or any(abs(self.off(self.N, self.D, v).mid()) <= 10.0 * TOUCH for v in turns)
+
+        def accurate() -> list[Crossing] | None:
+            roots = all_roots(self.p) if missed or any(touched_ends) else []
+            met = [(v, times % 2 == 0) for v, times in positive_roots(self.p)]
+            met = _merged(met, roots, partial(self.off, self.N, self.D), touched_ends)
+            values = [(v, self.N.at(v) / self.D.at(v), touch) for v, touch in met]
+            if not all(L.rel_accuracy_bits() >= _ACCURATE for _, L, _ in values):
+                return None
+            return [Crossing(float(v.sqrt().mid()), complex(L), touch) for v, L, touch in values]
+
+        return at_enough_bits(accurate, bits, "a crossing of the loop")
+
+
+def _off_circle(N: Split, D: Split, v: arb) -> arb:
+    return (N.at(v).abs_upper() / D.at(v).abs_lower()).log()
+
+
+def _off_axis(N: Split, D: Split, v: arb) -> arb:
+    L = N.at(v) / D.at(v)
+    return L.imag / L.abs_lower()
+
+
+@lru_cache(maxsize=8)
+def _lines(loop: ExactLoop) -> tuple[_Line, _Line]:
     N, D = split(loop.N), split(loop.D)
     gain = N.square - D.square
     if gain.degree() < 0:
         raise NumericalError("the gain of the loop is one at every frequency: it has no phase margin")
     phase = free_of(N.odd * D.even - N.even * D.odd, N.square, D.square)
+    return _Line(N, D, gain, _off_circle), _Line(N, D, phase, _off_axis)
 
-    def off_circle(v: arb) -> arb:
-        return (N.at(v).abs_upper() / D.at(v).abs_lower()).log()
 
-    def off_axis(v: arb) -> arb:
-        L = N.at(v) / D.at(v)
-        return L.imag / L.abs_lower()
+def crossings(
+    loop: ExactLoop, near: ExactLoop, merge: bool = False
+) -> tuple[tuple[Crossing, ...], tuple[Crossing, ...]]:
+    """Every crossing of the unit circle, and of the negative real axis.
 
+    The turns of a loop ``near`` it, or its own, tell whether a line is just missed: what moves a turn moves
+    the distance there by its square. With ``merge`` a gain within `TOUCH` of one at an end of the axis is
+    one, which is no crossing; between two crossings L that stays so close to the line only touches it in any
+    case.
+    """
+    lines, (circle, axis) = _lines(loop), _lines(near)
     both = (loop.N[0], loop.D[0]), loop.at_end
     touched = [
-        merge and gain[k] != 0 and _near_one(*end) for k, end in zip((0, loop.degree), both, strict=True)
+        merge and lines[0].p[k] != 0 and _near_one(*end)
+        for k, end in zip((0, loop.degree), both, strict=True)
     ]
-    gains = _crossings(N, D, gain, off_circle, touched)
-    reals = [c for c in _crossings(N, D, phase, off_axis) if c.L.real < 0.0]
+    gains = lines[0].met(circle.turns, touched)
+    reals = [c for c in lines[1].met(axis.turns) if c.L.real < 0.0]
     first, last = (
         [Crossing(w, complex(float(arb(n) / arb(d))))] if n * d < 0 else []
         for w, (n, d) in zip((0.0, math.inf), both, strict=True)
@@ -60,32 +112,6 @@ def crossings(loop: ExactLoop, merge: bool = False) -> tuple[tuple[Crossing, ...
 def _near_one(N: fmpz, D: fmpz) -> bool:
     """Whether the gain at an end of the axis is one within `TOUCH`."""
     return N != 0 and D != 0 and abs(float(abs(arb(N) / arb(D)).log())) <= TOUCH
-
-
-def _crossings(
-    N: Split, D: Split, p: fmpz_poly, off: Callable[[arb], arb], touched_ends: Sequence[bool] = (False, False)
-) -> list[Crossing]:
-    """The positive roots of p, touches merged; ``off`` is the distance to the line.
-
-    A line just missed is a pair of complex roots, with a turn of p between, or of its slope where a root lies
-    beside them; few loops have one.
-    """
-    slope = p.derivative()
-    with ctx.workprec(_TURN_BITS):
-        turns = [] if p.degree() <= FEW else [*positive_roots(slope), *positive_roots(slope.derivative())]
-    with ctx.workprec(_FIRST_BITS + p.degree()):
-        missed = p.degree() <= FEW or any(abs(off(v.mid()).mid()) <= 10.0 * TOUCH for v, _ in turns)
-
-    def accurate() -> list[Crossing] | None:
-        roots = all_roots(p) if missed or any(touched_ends) else []
-        met = [(v, times % 2 == 0) for v, times in positive_roots(p)]
-        met = _merged(met, roots, off, touched_ends)
-        values = [(v, N.at(v) / D.at(v), touch) for v, touch in met]
-        if not all(L.rel_accuracy_bits() >= _ACCURATE for _, L, _ in values):
-            return None
-        return [Crossing(float(v.sqrt().mid()), complex(L), touch) for v, L, touch in values]
-
-    return at_enough_bits(accurate, _FIRST_BITS + p.degree(), "a crossing of the loop")
 
 
 def _merged(

@@ -9,11 +9,12 @@ from flint import fmpq, fmpz, fmpz_mat, fmpz_poly
 
 from actuator_lti.margins.exact.roots import HalfPlanes, half_planes, warped
 from actuator_lti.margins.given import ULP, Given
+from actuator_lti.margins.poles import diagonal_blocks
 
 _S = fmpz_poly([0, 1])
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class ExactLoop:
     """L = N/D without common factors, and the hidden modes that were cancelled; integers, lowest power first.
 
@@ -140,21 +141,13 @@ def _by_matrices(given: Given) -> tuple[fmpz_poly, fmpz_poly]:
         return fmpz_poly(d), fmpz_poly([1 << shift])
     whole = [A[k * n : k * n + n] for k in range(n)]
     below = fmpz_poly([1])
-    for block in _blocks(given.A):
+    for block in diagonal_blocks(np.asarray(given.A)):
         below *= fmpz_mat([[whole[j][k] for k in block] for j in block]).charpoly()
     above = _numerator(whole, b, c, below)
     # of 2^shift A: below is 2^(shift n) det(sI - A) at s 2^-shift, above has one power less
     D, N = (fmpz_poly([x * (1 << (shift * k)) for k, x in enumerate(p.coeffs())]) for p in (below, above))
     power = shift_b + shift_c
     return N * (1 << (2 * shift)) + D * (d[0] << power), D * (1 << (shift + power))
-
-
-def _blocks(A: Any) -> list[list[int]]:
-    """States that act upon each other, directly or not: those of a chain of delays act one way alone."""
-    acts = (A != 0.0) | np.eye(len(A), dtype=bool)
-    for _ in range(len(A).bit_length()):
-        acts = acts.astype(float) @ acts > 0.0
-    return [np.flatnonzero(one).tolist() for one in np.unique(acts & acts.T, axis=0)]
 
 
 def _numerator(rows: list[list[int]], b: list[int], c: list[int], below: fmpz_poly) -> fmpz_poly:

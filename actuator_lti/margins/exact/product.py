@@ -6,13 +6,16 @@ same, once for the loop as given and once for each of its neighbours 8 ulp away.
 """
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 from flint import acb, arb, ctx
 
 from actuator_lti.margins.along import Along
-from actuator_lti.margins.checked import passed_into
+from actuator_lti.margins.assemble import Place
+from actuator_lti.margins.checked import passed_into, refuse_neutral
+from actuator_lti.margins.distances import Distance
 from actuator_lti.margins.exact.certified import certified_margins
 from actuator_lti.margins.exact.decided import ACROSS, hidden_notes, shared
 from actuator_lti.margins.exact.loop import ExactLoop, exact_loop, neighbours
@@ -81,26 +84,42 @@ def late_margins(given: Given, delay_s: float, band: tuple[float, float] | None)
     )
 
 
+@in_double_precision()
+def late_distances(given: Given, delay_s: float, distances: Sequence[Distance]) -> list[Place]:
+    """Smallest values of distances of a loop behind a delay, each with its w, as its doubles have them."""
+    with ctx.workprec(_BITS):
+        loop = exact_loop(given)
+        if loop.N.degree() < 0:
+            return [(distance.at_no_gain, 0.0) for distance in distances]
+        return _along(loop, given.period_s, delay_s, None).nearest(distances)
+
+
 def _found(
     loop: ExactLoop, period_s: float | None, delay_s: float, band: tuple[float, float] | None
 ) -> tuple[Along, int, int | None]:
     """What one of them does along the axis, and its unstable closed-loop poles by both ways."""
+    found, free = _along(loop, period_s, delay_s, band), loop.closed_poles
+    nyquist = loop.poles.right - found.half_turns
+    if period_s is not None or free.on_border:
+        return found, nyquist, None
+    if nyquist != free.right + passed_into(found.loop, found.gain_w):
+        raise Doubtful("poles and Nyquist count disagree")
+    return found, nyquist, nyquist
+
+
+def _along(
+    loop: ExactLoop, period_s: float | None, delay_s: float, band: tuple[float, float] | None
+) -> Along:
     if loop.D.degree() < loop.degree:
         raise Doubtful("a pole at z = -1, where L behind part of a sample jumps")
-    zeros, poles, free = loop.zeros, loop.poles, loop.closed_poles
     product = _product(loop, period_s, delay_s)
+    refuse_neutral(product)
     factors = replace(
         with_delay(product.roots[0], product.weights, product),
         log_gain=math.log(abs(product.lead)),
-        phase=math.pi * (zeros.right - poles.right + (product.lead < 0.0)),
+        phase=math.pi * (loop.zeros.right - loop.poles.right + (product.lead < 0.0)),
     )
-    found = Along(factors, product, band).polish()
-    nyquist = poles.right - found.half_turns
-    if period_s is not None or free.on_border:
-        return found, nyquist, None
-    if nyquist != free.right + passed_into(product, found.gain_w):
-        raise Doubtful("poles and Nyquist count disagree")
-    return found, nyquist, nyquist
+    return Along(factors, product, band).polish()
 
 
 def _product(loop: ExactLoop, period_s: float | None, delay_s: float) -> ProductLoop:
