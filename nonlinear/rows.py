@@ -99,9 +99,9 @@ class Rows(Compared):
         """Step from ``start_s`` on; a start before zero is a constant."""
         self._signal(place, at.STEP, size, start_s)
 
-    def ramp(self, place: str, rate: npt.ArrayLike, start_s: npt.ArrayLike = 0.0) -> None:
-        """Ramp from a time on, which may lie before the run."""
-        self._signal(place, at.RAMP, rate, start_s, np.inf)
+    def ramp(self, place: str, rate: npt.ArrayLike, first: npt.ArrayLike = 0.0) -> None:
+        """Ramp from t = 0 and a first value on."""
+        self._signal(place, at.RAMP, rate, 0.0, np.inf, first)
 
     def sine(
         self,

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cached_property, partial
 from math import isfinite
 from typing import Any
 
@@ -52,12 +52,12 @@ class Driven:
     early_s: Floats | None = None  # each step comes before its row, where that is known
     hold: Hold | None = None  # of a command whose steps are on a grid that the rows tell
 
-    @property
+    @cached_property
     def steps(self) -> Ints:
         """The first row behind each step."""
         return steps_at(self.values, self.together)
 
-    @property
+    @cached_property
     def first(self) -> Ints:
         """The first of the steps that come as much before their rows: neighbours, or all of one hold."""
         rows = len(self.values)
@@ -162,9 +162,8 @@ def at_ticks(driven: Driven, time_s: Floats, duration_s: float, early_s: Floats)
     period = driven.design.controller.period_s
     ticks = np.asarray(np.arange(round(duration_s / period) + 1) * period, dtype=np.float64)
     values = np.empty_like(ticks)
-    later = driven.steps
-    starts, ends = [0, *later], [*later, len(time_s)]
-    edges = np.searchsorted(ticks, time_s[starts] - [0.0, *early_s] - 1e-6 * period)
+    starts, ends = np.append(0, driven.steps), np.append(driven.steps, len(time_s))
+    edges = np.searchsorted(ticks, time_s[starts] - np.append(0.0, early_s) - 1e-6 * period)
     edges[0] = 0
     if driven.between == HELD:
         return ticks, np.repeat(driven.values[starts], np.diff(edges, append=len(ticks)))

@@ -76,16 +76,25 @@ def by_loop(design: Design) -> list[Requirement]:
 
 
 def in_populations(requirement: Requirement, design: Design) -> bool:
-    """Whether figures of many designs have it: they know the free rotor, and what is behind the mean."""
-    quantity, command = QUANTITIES[requirement.quantity], design.command
+    """Whether figures of many designs have it."""
+    quantity = QUANTITIES[requirement.quantity]
     if quantity.scope == "drive":
         return not np.isnan(drive_figure(design, quantity.name, requirement.load_Nm or 0.0))
-    if quantity.scope == "analysis" or requirement.rotor == "locked":
-        return False
+    return quantity.scope == "loop" and not left_out(requirement, design)
+
+
+def left_out(requirement: Requirement, design: Design) -> str:
+    """What keeps figures of many designs from one of a loop, in words; empty where they have it."""
+    if requirement.rotor == "locked":
+        return "figures of many designs are of the free rotor"
     loops = judged_loops(requirement.loop, design.controller.stages)
-    if not quantity.of_response or "position" not in loops:
-        return True
-    return command.filter_time_s == 0.0 if requirement.to == "reference" else command_mean(design) is None
+    if not QUANTITIES[requirement.quantity].of_response or "position" not in loops:
+        return ""
+    if requirement.to == "reference":
+        filtered = design.command.filter_time_s > 0.0
+        return "figures of many designs have command.filter_time in them" if filtered else ""
+    mean = "figures of many designs lack the mean of command.jerk"
+    return f'{mean}, which to = "reference" leaves out' if command_mean(design) else ""
 
 
 def source_columns(requirement: Requirement, design: Design) -> tuple[str, ...]:

@@ -19,7 +19,7 @@ from actuator_lti.loops import stiffness as linear
 from analyses.specification.requirements import RequirementVerdict, judged_by, tally
 from nonlinear import commands, simulate, tangent
 from nonlinear.bench.loop_setup import HELD, LoopSetup
-from nonlinear.bench.operating_motion import creeping, may_stand, on_the_bench, standing
+from nonlinear.bench.operating_motion import creeping, is_uneven, on_the_bench, standing
 from nonlinear.loads import series
 
 State = Literal["powered", "shorted", "open"]
@@ -144,7 +144,7 @@ def check_stiffness(design: Design, frequencies_hz: Sequence[float]) -> tuple[Ch
 
 
 def _checked(bench: Design, way: OperatingPoint, hertz: npt.NDArray[np.float64]) -> tuple[Check, ...]:
-    moving = way != "sliding" or not may_stand(bench)
+    moving = way != "sliding" or is_uneven(bench.friction)
     motion = creeping(bench, driven=way == "driven") if moving else standing(bench)
     at = replace(motion.operating(bench), point=way, speed_rad_s=0.0, angle_rad=motion.output_rad(bench))
     response = linear.compliance(bench, at)

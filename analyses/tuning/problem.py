@@ -2,7 +2,7 @@
 
 import os
 import re
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from math import inf
@@ -20,7 +20,7 @@ from actuator_lti.design.units import parse_limit
 from actuator_lti.drive.steady import droop
 from actuator_lti.errors import InputError
 from actuator_lti.types import Floats
-from analyses.monte_carlo.judging import drive_column, in_populations, judge, loop_columns, loops_of
+from analyses.monte_carlo.judging import drive_column, in_populations, judge, left_out, loop_columns, loops_of
 from analyses.studies.sampling import Factor, as_values, correlation_of, semidefinite_root
 from analyses.tuning.start import Element, Variable, allowed_range, change, place
 
@@ -198,8 +198,16 @@ def gain_requirements(design: Design, extra: tuple[Requirement, ...] = ()) -> tu
     chosen = tuple(r for r in every if r.quantity in moved and in_populations(r, design))
     if not chosen:
         told = "no requirement on a loop: nothing to tune for; state margins and bandwidths in the "
-        raise InputError(told + 'file, or as --require "position.bandwidth>=30 Hz"')
+        told += 'file, or as --require "position.bandwidth>=30 Hz"'
+        raise InputError("; ".join(why_not_searched(every, design)) or told)
     return chosen
+
+
+def why_not_searched(requirements: Iterable[Requirement], design: Design) -> Iterator[str]:
+    """Of each requirement on a loop that the search cannot have, what keeps it from it."""
+    for one in requirements:
+        if one.quantity in LOOP_QUANTITIES and (why := left_out(one, design)):
+            yield f"not searched for is {one.id}: {why}"
 
 
 def problem_of(

@@ -17,7 +17,14 @@ from analyses.specification.requirements import RequirementVerdict
 from analyses.tuning import result
 from analyses.tuning.asked import Aim, TuningSettings
 from analyses.tuning.least import least_change
-from analyses.tuning.problem import MOST_DESIGNS, Problem, asked_for, gain_requirements, problem_of
+from analyses.tuning.problem import (
+    MOST_DESIGNS,
+    Problem,
+    asked_for,
+    gain_requirements,
+    problem_of,
+    why_not_searched,
+)
 from analyses.tuning.solve import RESERVE, Solution, solve, trade_off
 from analyses.tuning.start import Element, RuleGains, checked, neighbours, object_of, rule_gains, step_of_gain
 
@@ -83,7 +90,7 @@ def tune(
         checks=checks,
         trade_off=curve,
         evaluations=sum(one.evaluations for one, _ in tried),
-        notes=tuple(_notes(problem, gains, distances, confirmed)),
+        notes=(*why_not_searched(stated, design), *_notes(problem, gains, distances, confirmed)),
         aim=settings.aim,
         placed=problem.elements,
         confirmed=confirmed,

@@ -55,8 +55,8 @@ def chirp_cycles(kind, f0, f1, span, s):
 
 def signal(row, at, tables, k, period):
     """Value at tick k of the signal whose eight numbers begin at ``row[at]``."""
-    # kind, amplitude, start time; then frequency and phase (sine, triangle), stop time (ramp), f0, f1 and
-    # span (chirps), offset and length in the tables (table: held after its end)
+    # kind, amplitude, start time; then frequency and phase (sine, triangle), stop time and first value
+    # (ramp), f0, f1 and span (chirps), offset and length in the tables (table: held after its end)
     kind = int(row[at])
     if kind == layout.NONE:
         return 0.0
@@ -73,7 +73,7 @@ def signal(row, at, tables, k, period):
     if kind == layout.STEP:
         return amplitude
     if kind == layout.RAMP:
-        return amplitude * min(s, row[at + 3])
+        return row[at + 4] + amplitude * min(s, row[at + 3])
     if kind == layout.TRIANGLE:
         return amplitude * triangle_wave(row[at + 3] * s + row[at + 4] / TWO_PI)
     return amplitude * math.sin(TWO_PI * chirp_cycles(kind, row[at + 3], row[at + 4], row[at + 5], s))

@@ -73,8 +73,7 @@ class Differences:
             return
         if speed == 0.0 and place.integral_time_s is not None:
             start[at.S_POSITION_INTEGRATOR] = setup.wanted  # in no row, either
-        size, since_s = self.injected.rows.values[0, [at.BIAS + 1, at.BIAS + 2]]
-        now = -N * size * since_s if speed else N * size
+        now = N * self.injected.rows.values[0, at.BIAS + (4 if speed else 1)]  # of a ramp, or of a step
         period_s = place.every * setup.design.controller.period_s
         start[[at.S_REFERENCE, at.S_REFERENCE_BEFORE]] = now - speed * period_s * np.array([1.0, 2.0])
 

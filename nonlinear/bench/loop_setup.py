@@ -179,7 +179,7 @@ class LoopSetup:
             if speed == 0.0:
                 row.step("bias", command, -1.0)
             else:
-                row.ramp("bias", speed / N, -command / (speed / N))
+                row.ramp("bias", speed / N, command)
             return
         place = self.design.controller.position_loop
         holds = speed == 0.0 and place.integral_time_s is not None  # an integral needs no error
@@ -189,7 +189,7 @@ class LoopSetup:
         if speed == 0.0:
             row.step("bias", (ahead + seen) / N, -1.0)
         else:
-            row.ramp("bias", speed / N, -(ahead + seen) / speed)
+            row.ramp("bias", speed / N, (ahead + seen) / N)
 
     @property
     def steady_start(self) -> bool:

@@ -111,9 +111,12 @@ def needs_press(design: Design) -> bool:
 
 def may_stand(design: Design) -> bool:
     """Whether the drive has one slope about rest, of play and friction, once its dry friction is left out."""
-    friction = design.friction
-    uneven = bool(friction.points) or friction.viscous(1) != friction.viscous(-1)
-    return follows_angle(design) or not (uneven or needs_press(design))
+    return follows_angle(design) or not (is_uneven(design.friction) or needs_press(design))
+
+
+def is_uneven(friction: Friction) -> bool:
+    """Whether its slope differs by speed or direction, so that a drive at rest has not one."""
+    return bool(friction.points) or friction.viscous(1) != friction.viscous(-1)
 
 
 def creeping(design: Design, *, driven: bool = False) -> OperatingMotion:

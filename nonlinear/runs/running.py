@@ -199,7 +199,7 @@ def _hold_signal(p: Floats, place: int, tables: Floats, tick: int) -> bool:
     if kind == at.TABLE:
         return _hold_table(p, place + 3, tables, tick)
     if kind == at.RAMP:
-        p[place + 1] *= p[place + 3]
+        p[place + 1] = p[place + 4] + p[place + 1] * p[place + 3]
     over = time >= (p[place + 3] if kind == at.RAMP else 0.0)
     p[place], p[place + 2] = at.STEP, 0.0
     return over and kind in (at.STEP, at.RAMP)

@@ -3,6 +3,7 @@
 import cmath
 import json
 import math
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -44,6 +45,22 @@ def integrator(*requirements, gain=5.0):
     control = {"computing_delay_s": DELAY, "position": PositionLoop(gain=gain)}
     more = {"friction": {"viscous_Nms_rad": 1.0}, "requirements": requirements}
     return source_drive(1e-9, 1.0, PERIOD, 10.0, controller=control, **more)
+
+
+def test_a_requirement_that_the_search_cannot_have_is_told_with_the_reason():
+    """Not "no requirement on a loop", which is what is asked for."""
+    command = {"rate_rad_s": 1.0, "acceleration_rad_s2": 10.0, "jerk_rad_s3": 400.0}
+    asked = need("bandwidth", 9.0, loop="position")
+    smooth = changed(integrator(asked, gain=5.0), command=command)
+    reason = (
+        f'not searched for is {asked.id}: .* lack the mean of command.jerk, which to = "reference" leaves out'
+    )
+    with pytest.raises(InputError, match=reason):
+        tune(smooth, QUICK)
+    both = replace(smooth, requirements=(asked, need("phase_margin", 60.0, loop="position")))
+    assert re.search(reason, " ".join(tune(both, QUICK).notes))
+    behind = replace(smooth, requirements=(replace(asked, to="reference", minimum=1.0),))
+    assert tune(behind, QUICK).feasible
 
 
 @pytest.mark.parametrize("margin", [30.0, 45.0, 60.0])

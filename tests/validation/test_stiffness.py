@@ -2,6 +2,7 @@
 
 import re
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -22,6 +23,7 @@ from reports.charts.svg import draw_svg
 from reports.sections.stiffness import section
 from tests.changed import changed
 from tests.loops.loop_designs import drive_d, drive_e
+from tests.nonlinear.elastic_drive import stribeck
 
 FIN, COMPLIANT = load_design("fin"), load_design("ilr33-amber-compliant")
 K4 = [(1, 16.9017216631, -53.84128746), (20, 67.434351877, 146.7856309), (80, 729.024662292, 99.71033514)]
@@ -82,6 +84,21 @@ def test_the_simulator_checks_the_stiffness_that_is_quoted(efficiency: float, de
     found = many(Population(design, {"friction.load_coefficient": values}, 3), "least_stiffness")
     alone = [changed(design, friction={"load_coefficient": value}) for value in values]
     assert found == pytest.approx([drive_figure(one, "least_stiffness") for one in alone], rel=1e-9)
+
+
+@pytest.mark.parametrize("integral_s", [None, 0.6])
+@pytest.mark.parametrize("loss", [0.0, 1.5e-3])
+@pytest.mark.parametrize(
+    "slopes",
+    [{"points": stribeck((0.0, 0.06), (5.0, 0.045), (300.0, 0.13))}, {"viscous_reverse_Nms_rad": 2e-3}],
+)
+def test_friction_of_several_slopes_is_checked_on_its_first(
+    slopes: dict[str, Any], loss: float, integral_s: float | None
+) -> None:
+    """A link under gravity creeps, the twist of its pressed spring in the angle that is commanded."""
+    friction, position = {"load_coefficient": loss, **slopes}, {"integral_time_s": integral_s}
+    design = changed(load_design("joint"), friction=friction, controller={"position": position})
+    assert max(check.difference for check in check_stiffness(design, [2.0, 10.0])) < 1e-8
 
 
 def test_an_integral_on_the_output_comes_back_and_a_self_locking_gear_does_not_move() -> None:
