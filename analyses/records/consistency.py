@@ -318,21 +318,24 @@ def _steps(design: Design, record: Record) -> Finding | None:
 
     Between steps of the position that are alike, two on either side, one is that of two rows or more; or one
     is nothing and the next that of two. Steps of less than ten counts of an encoder, or within noise, tell
-    nothing.
+    nothing. Of a number with so many digits the counts are coarser the larger it is: a count is the least
+    step from there on outward.
     """
     place = place_of(design, record)
     if place is None or record.averaged > 1 or len(record) < LEAST_ROWS:
         return None
     step = np.diff(place[1]) / np.diff(record.time_s)
     rows = np.lib.stride_tricks.sliding_window_view(step, 6)
-    count = np.min(np.abs(step), where=step != 0.0, initial=inf)
+    inward = np.argsort(-np.maximum(np.abs(place[1][1:]), np.abs(place[1][:-1])), kind="stable")
+    count = np.empty_like(step)
+    count[inward] = np.minimum.accumulate(np.where(step == 0.0, inf, np.abs(step))[inward])
 
     def times_its_neighbours(at: int, beside: list[int]) -> tuple[Floats, int]:
         """A step of each row over those beside it, 0 where these are not alike; how many are."""
         mean, size = rows[:, beside].mean(axis=1), np.abs(rows[:, beside].mean(axis=1))
         alike = np.all(np.abs(rows[:, beside] - mean[:, None]) < STEADY * size[:, None], axis=1)
         noise = NORMAL * float(np.median(np.abs(rows[:, at] - mean)))  # of a normal deviation
-        alike &= (STEADY * size > count) & (0.5 * size > SURE * noise)
+        alike &= (STEADY * size > count[at : at + len(rows)]) & (0.5 * size > SURE * noise)
         share = np.divide(rows[:, at], mean, out=np.zeros(len(mean)), where=alike)
         return share, int(np.count_nonzero(alike))
 
