@@ -80,10 +80,11 @@ class Command:
         times, values = self.samples
         even = np.linspace(times[0], times[-1], times.size)
         above = np.fft.rfftfreq(even.size, even[1] - even[0]) > nyquist_hz
+        if not above.any():  # of samples at the ticks no line is
+            return 0.0
         y = np.interp(even, times, values / (np.abs(values).max() or 1.0))
         y = y - np.linspace(y[0], y[-1], y.size)
-        size = float(np.ptp(y))
-        if size == 0.0 or not above.any():  # of samples at the ticks no line is
+        if (size := float(np.ptp(y))) == 0.0:
             return 0.0
         lines = 4.0 * np.abs(np.fft.rfft(y * np.hanning(y.size))) / y.size
         return float(lines[above].max()) / (0.5 * size)

@@ -19,15 +19,16 @@ def step_figures(n, a, b, c, lead, poles, row, state, after):
 
     All are times of samples; the response is followed until it has stayed within the band for nine time
     constants of the slowest pole, however far above it a resonance was. Where that pole is real and far
-    slower than the rest, its tail is known in closed form.
+    slower than the rest, its tail is known in closed form. A response that would have to be followed for
+    longer than `LONGEST` has no overshoot and no settling time here: both stay as they are, NaN.
     """
     radius = row[RADIUS]
     final = row[FINAL]
     if not (radius < 1.0) or not (abs(final) > 0.0):
         return
-    inside = int(min(float(LONGEST), max(-INSIDE / math.log(radius), n + 2.0)))
+    inside = max(-INSIDE / math.log(radius), n + 2.0)
     alone = _ticks_until_alone(n, poles, radius)
-    tail = alone < inside
+    tail = alone < min(inside, float(LONGEST))
     ticks = int(alone) if tail else LONGEST
     fed_back = 0.0 if math.isnan(lead) else 1.0
     for i in range(n):
@@ -72,6 +73,8 @@ def step_figures(n, a, b, c, lead, poles, row, state, after):
         if abs(rest) > 0.02:
             outside = ticks + _ticks_to(rest, 0.02, radius) - 1
     row[RISE] = float(ninety - ten) if ninety >= 0 else math.nan
+    if not tail and k - outside < inside:
+        return
     row[OVERSHOOT] = 100.0 * (highest - 1.0) if highest > 1.0 + 1e-9 else 0.0
     row[SETTLING] = outside + 1.0
 

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cached_property, partial
 from math import isfinite
 from typing import Any
 
@@ -52,12 +52,12 @@ class Driven:
     early_s: Floats | None = None  # each step comes before its row, where that is known
     hold: Hold | None = None  # of a command whose steps are on a grid that the rows tell
 
-    @property
+    @cached_property
     def steps(self) -> Ints:
         """The first row behind each step."""
         return steps_at(self.values, self.together)
 
-    @property
+    @cached_property
     def first(self) -> Ints:
         """The first of the steps that come as much before their rows: neighbours, or all of one hold."""
         rows = len(self.values)
@@ -77,13 +77,14 @@ def readings(driven: Driven, record: Record) -> list[Driven]:
     Jumps in neighbouring rows are a curve or steps; a curve is smooth, or the drive takes it in straight
     lines or, as from a field bus, held until the next sample. Where the rows tell a grid on which it jumps,
     it is held, and each jump on the grid or, of a sender that is not punctual, at any tick before its row
-    (where more than a tick is left to them: rows at all phases show that the jumps are on their grid).
+    (where more than a tick is left to them, or none but a clock that is off makes the grid: otherwise rows at
+    all phases show that the jumps are on it).
     """
     early, tick_s = record.early_s, driven.design.controller.period_s
     held = replace(driven, together=len(record), between=HELD)
     row_s = float(record.time_s[-1] - record.time_s[0]) / max(len(record) - 1, 1)
     if (hold := hold_of(held.steps, len(record), row_s, tick_s)) is not None:
-        on_grid, anywhere = _on_grid(held, hold), hold.room_s > tick_s
+        on_grid, anywhere = _on_grid(held, hold), hold.room_s > tick_s or hold.tick_s != tick_s
         if early is None:
             return [on_grid, held] if anywhere else [on_grid]
         told = early[held.steps]
@@ -162,9 +163,8 @@ def at_ticks(driven: Driven, time_s: Floats, duration_s: float, early_s: Floats)
     period = driven.design.controller.period_s
     ticks = np.asarray(np.arange(round(duration_s / period) + 1) * period, dtype=np.float64)
     values = np.empty_like(ticks)
-    later = driven.steps
-    starts, ends = [0, *later], [*later, len(time_s)]
-    edges = np.searchsorted(ticks, time_s[starts] - [0.0, *early_s] - 1e-6 * period)
+    starts, ends = np.append(0, driven.steps), np.append(driven.steps, len(time_s))
+    edges = np.searchsorted(ticks, time_s[starts] - np.append(0.0, early_s) - 1e-6 * period)
     edges[0] = 0
     if driven.between == HELD:
         return ticks, np.repeat(driven.values[starts], np.diff(edges, append=len(ticks)))

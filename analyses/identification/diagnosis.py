@@ -16,6 +16,7 @@ from analyses.estimation.parameters import Parameter, parameter
 from analyses.identification.friction_law import Bend, bend_of, kept_columns
 from analyses.identification.inverse import fit_records
 from analyses.identification.joint_model import JointModel, Recipe, RecordFit
+from analyses.identification.output_error import simulated_part
 from analyses.identification.rows import drive_of, is_benchmark, recipe_for, record_rows, rows_under
 from analyses.records.consistency import ALIKE, SURE, Finding, clock_doubt, resistance_doubt
 from analyses.records.naming import KNOWN_UNITS
@@ -108,8 +109,9 @@ def _followed(start: Design, record: Record, simulated: Mapping[str, Floats]) ->
     one = followed(start, record, simulated)
     if one is None or one.alike >= ALIKE:
         return one
-    names = [name for name in AXIS_SIGNALS[start.axis] if name in record.signals]
-    own, _ = model_signals(start, record, {name: record[name] for name in names})
+    part = simulated_part(start, record)
+    names = [name for name in AXIS_SIGNALS[start.axis] if name in part.signals]
+    own, _ = model_signals(start, part, {name: part[name] for name in names})
     return followed(start, record, own)
 
 

@@ -31,11 +31,13 @@ from analyses.identification.joint_model import NAMES, FrictionForm, JointModel,
 from analyses.identification.motion_noise import with_noise_of_motion
 from analyses.identification.own_bias import without_bias
 from analyses.identification.run_down import fit_run_downs, runs_down
+from analyses.records.consistency import resistance_doubt
 from analyses.records.record import HELD, SMOOTH, Record
 
 Both = tuple[Sequence[Record], Sequence[Record]]  # records as taken, and simulated
 ROUNDS = 4
 SETTLED = 0.1  # standard errors by which the motor may still move
+AGREES = 1e-9  # of a signal: as closely as a simulated drive is its linear loop, and no miss
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -104,6 +106,13 @@ class Sought:
                 best_one = _widened(plain, best_one, other, share)
         return best_one
 
+    def _with_scale_of_current(self, motor: ElectricalFit, right: Diagnosed) -> Found:
+        """What was found; what the current may be too small by is in R and L as it is in all torques."""
+        doubt = max((resistance_doubt(self.design, record) for record in right.records), key=abs)
+        by_current = np.isin(motor.names, ("resistance", "inductance"))
+        motor = motor.wider(doubt / (1.0 + doubt) * by_current * motor.values)
+        return Found(start=_with_motor(self.plain, motor, right.records), electrical=motor, right=right)
+
     def _together(self, others: Sequence[Found], records: Sequence[Record]) -> list[Found] | None:
         """Motor and motion by simulation; again where a lag of the current was taken back.
 
@@ -133,7 +142,7 @@ class Sought:
             first, records = right, right.records
         told = first or right
         right = replace(right, late_s=told.late_s, findings=told.findings)
-        return [Found(start=start, electrical=motor, right=right)]
+        return [self._with_scale_of_current(motor, right)]
 
     def _in_turn(self, records: Sequence[Record]) -> Found:
         """The motor and the motion in turn.
@@ -150,7 +159,7 @@ class Sought:
             right = self._diagnosed(start, records)
             if _settled(before, found) and _settled(model, right.model):
                 break
-        return Found(start=start, electrical=found, right=right)
+        return self._with_scale_of_current(found, right)
 
     def by_voltage(
         self, records: Sequence[Record], simulated: tuple[Design, Diagnosed] | None = None
@@ -218,7 +227,8 @@ def _misses(design: Design, tried: Sequence[Both]) -> Floats:
     for ways in zip(*pairs, strict=False):
         names = [name for name in AXIS_SIGNALS[design.axis] if name in ways[0][0].signals]
         off = np.array([[_missed(design, own, like, name) for name in names] for own, like in ways])
-        size = np.min(np.mean(off**2, axis=2), axis=0)
+        least = [AGREES**2 * np.mean(ways[0][0][name] ** 2) for name in names]
+        size = np.maximum(np.min(np.mean(off**2, axis=2), axis=0), least)
         rows = np.sum(0.5 * off**2 / np.maximum(size, 1e-300)[:, None], axis=1)
         blocks = np.array_split(rows, int(np.sqrt(rows.shape[1])), axis=1)
         sums.append(np.transpose([np.sum(block, axis=1) for block in blocks]))

@@ -8,7 +8,6 @@ velocity controller does not know of it and goes on integrating.
 """
 
 from dataclasses import dataclass
-from functools import lru_cache
 from itertools import pairwise
 from math import asin, ceil, isfinite, pi, sqrt
 from typing import Any, Literal
@@ -198,7 +197,7 @@ def settles(design: Design, size_rad: float) -> bool:
 
     What moves on about as much without limits is kept going by something else (friction, counts).
     """
-    rest = _ending(design, size_rad)
+    rest = settle(design, 0.0, size_rad).rest
     if not _limits_of(rest) or (rest.verdict == "limit cycle" and rest.amplitude <= accepted_rad(design)):
         return True
     if rest.verdict == "still moving":  # against a limit it dies out by a constant amount a period, no share
@@ -211,12 +210,6 @@ def settles(design: Design, size_rad: float) -> bool:
     return not without.comes_to_rest and rest.amplitude <= ABOUT * without.amplitude
 
 
-@lru_cache(maxsize=64)
-def _ending(design: Design, size_rad: float) -> Rest:
-    """What a step ends in; those about the threshold are asked for again."""
-    return settle(design, 0.0, size_rad).rest
-
-
 def _limits_of(rest: Rest) -> list[str]:
     """The drive's own limits that act in what a motion ends in."""
     return [name for name in rest.limited if name in OWN]
@@ -224,7 +217,7 @@ def _limits_of(rest: Rest) -> list[str]:
 
 def _end(design: Design, size_rad: float) -> dict[str, Any]:
     """What the smallest step that does not settle ends in, and which limit acts then for how much of it."""
-    rest = _ending(design, size_rad)
+    rest = settle(design, 0.0, size_rad).rest
     run = _halves(design, size_rad, rest.after_s).run()
     used = run.window_limit_fraction if run.ok[0] else run.limit_fraction  # it may not get so far
     shares = {name: float(used(name)[0]) for name in _limits_of(rest)}
@@ -244,7 +237,7 @@ def _halves(design: Design, size_rad: float, duration_s: float, most_ticks: int 
 
 def _hovering(design: Design, size_rad: float) -> tuple[float | None, float | None]:
     """Frequency and amplitude of the oscillation at the threshold, from the half waves that change least."""
-    rest = _ending(design, size_rad)
+    rest = settle(design, 0.0, size_rad).rest
     run = _halves(design, size_rad, rest.after_s, rest.work).trajectory()  # kept: no longer than followed
     error = run.output_angle_rad - size_rad
     error = error[np.isfinite(error)]

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from math import degrees, inf, radians
 
 import numpy as np
@@ -59,8 +60,9 @@ def counted(rest: Rest, least: float) -> Rest:
     return replace(rest, verdict="at rest") if swings and small else rest
 
 
+@lru_cache(maxsize=256)
 def settle(design: Design, load_Nm: float, step_rad: float) -> Settling:
-    """Step and wait; the command is of the position loop.
+    """Step and wait, once for all who ask; the command is of the position loop.
 
     >>> from actuator_lti.design import load_design
     >>> settle(load_design("ilr33-amber"), 8.0, 0.01).rest.verdict

@@ -3,6 +3,7 @@
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
+from functools import lru_cache, partial
 from math import inf, isfinite
 
 import numpy as np
@@ -91,7 +92,9 @@ def check_record(design: Design, record: Record) -> tuple[Finding, ...]:
     known factor explains is named.
     """
     design, as_read = record.drive(design), record.as_read or record
-    checks = (_rate, _still, _time, _clock, _reduction, _electrical, _sign, _command, _supply)
+    ratio = rate_ratio(design, record)
+    rate, electrical = partial(_rate, ratio), partial(_electrical, abs(_doubt(design, record, ratio)))
+    checks = (rate, _still, _time, _clock, _reduction, electrical, _sign, _command, _supply)
     steps = _steps(design, record)  # a row that is lost at full speed looks like a jump
     steps = steps if steps and steps.passed is False else _jumps(design, as_read) or steps
     found = (_rows(as_read), steps, *(check(design, record) for check in checks), *_limits(design, as_read))
@@ -111,7 +114,13 @@ def _smooth(record: Record, values: Floats) -> Floats:
     share = 2.0 * SMOOTH_HZ * record.period_s
     if share >= 0.5 or len(values) < 60:
         return values
-    return np.asarray(sosfiltfilt(butter(2, share, output="sos"), values, padtype="even"))
+    return np.asarray(sosfiltfilt(_low_pass(share), values, padtype="even"))
+
+
+@lru_cache
+def _low_pass(share: float) -> Floats:
+    """Its sections, of a corner at a share of half the sampling rate; made once for all signals."""
+    return np.asarray(butter(2, share, output="sos"))
 
 
 def _inner(record: Record) -> slice:
@@ -187,8 +196,8 @@ def _bounds(y: Floats, x: Floats, beside_x: Floats, beside_y: Floats) -> tuple[f
     return min(all_ends), max(all_ends)
 
 
-def _rate(design: Design, record: Record) -> Finding | None:
-    ratio, name = rate_ratio(design, record), RATES[design.axis]
+def _rate(ratio: RateRatio | None, design: Design, record: Record) -> Finding | None:
+    name = RATES[design.axis]
     if ratio is None:
         return None
     subject, off = f"{name} against the rate of the {ratio.place}", ratio.found - 1.0
@@ -227,7 +236,11 @@ def _still(design: Design, record: Record) -> Finding | None:
 
 def clock_doubt(design: Design, record: Record) -> float:
     """The share by which a record's clock may be off: of its speed, or of its period from whole ticks."""
-    if (rate := rate_ratio(design, record)) is not None:
+    return _doubt(design, record, rate_ratio(design, record))
+
+
+def _doubt(design: Design, record: Record, rate: RateRatio | None) -> float:
+    if rate is not None:
         return rate.doubt
     ticks = record.period_s / design.controller.period_s
     off = ticks / max(round(ticks), 1) - 1.0
@@ -305,21 +318,24 @@ def _steps(design: Design, record: Record) -> Finding | None:
 
     Between steps of the position that are alike, two on either side, one is that of two rows or more; or one
     is nothing and the next that of two. Steps of less than ten counts of an encoder, or within noise, tell
-    nothing.
+    nothing. Of a number with so many digits the counts are coarser the larger it is: a count is the least
+    step from there on outward.
     """
     place = place_of(design, record)
     if place is None or record.averaged > 1 or len(record) < LEAST_ROWS:
         return None
     step = np.diff(place[1]) / np.diff(record.time_s)
     rows = np.lib.stride_tricks.sliding_window_view(step, 6)
-    count = np.min(np.abs(step), where=step != 0.0, initial=inf)
+    inward = np.argsort(-np.maximum(np.abs(place[1][1:]), np.abs(place[1][:-1])), kind="stable")
+    count = np.empty_like(step)
+    count[inward] = np.minimum.accumulate(np.where(step == 0.0, inf, np.abs(step))[inward])
 
     def times_its_neighbours(at: int, beside: list[int]) -> tuple[Floats, int]:
         """A step of each row over those beside it, 0 where these are not alike; how many are."""
         mean, size = rows[:, beside].mean(axis=1), np.abs(rows[:, beside].mean(axis=1))
         alike = np.all(np.abs(rows[:, beside] - mean[:, None]) < STEADY * size[:, None], axis=1)
         noise = NORMAL * float(np.median(np.abs(rows[:, at] - mean)))  # of a normal deviation
-        alike &= (STEADY * size > count) & (0.5 * size > SURE * noise)
+        alike &= (STEADY * size > count[at : at + len(rows)]) & (0.5 * size > SURE * noise)
         share = np.divide(rows[:, at], mean, out=np.zeros(len(mean)), where=alike)
         return share, int(np.count_nonzero(alike))
 
@@ -393,9 +409,12 @@ def _electrical_parts(design: Design, record: Record) -> dict[str, tuple[float, 
     return {"R i + kE w": _bounds(u, total, np.gradient(total), np.gradient(u))}
 
 
-def _electrical(design: Design, record: Record) -> Finding | None:
-    """Voltage, current and motion through R, L and kE, at the accuracy of the signals and of the design."""
-    if not (told := _voltage_told(design, record)):
+def _electrical(doubt: float, design: Design, record: Record) -> Finding | None:
+    """Voltage, current and motion through R, L and kE, at the accuracy of the signals and of the design.
+
+    ``doubt`` is the share by which the clock may be off.
+    """
+    if not (told := _voltage_told(design, record, doubt)):
         return None
     (passed, words), u, i = told, record["voltage"], record["current"]
     for cause, changed in (
@@ -405,7 +424,7 @@ def _electrical(design: Design, record: Record) -> Finding | None:
         ("the columns of current and voltage are swapped", {"voltage": i, "current": u}),
     ):
         other = replace(record, signals={**record.signals, **changed})
-        if passed is False and (instead := _voltage_told(design, other)) and instead[0] is not False:
+        if passed is False and (instead := _voltage_told(design, other, doubt)) and instead[0] is not False:
             return Finding("voltage against R i + kE w", False, f"{words}: {cause}")
     if passed is None and (stands := _standing_current(design, record)):
         passed, words = False, stands
@@ -414,9 +433,8 @@ def _electrical(design: Design, record: Record) -> Finding | None:
     return Finding("voltage against R i + kE w", passed, words)
 
 
-def _voltage_told(design: Design, record: Record) -> tuple[bool | None, str] | None:
+def _voltage_told(design: Design, record: Record, doubt: float) -> tuple[bool | None, str] | None:
     """Whether each part of the voltage counts once, and in words; None where nothing tells."""
-    doubt = abs(clock_doubt(design, record))
     parts = _electrical_parts(design, record).items()
     told = [_counted(design, name, *ends, doubt if name == "kE w" else 0.0) for name, ends in parts]
     each = [one for one, _ in told]

@@ -2,6 +2,7 @@
 
 import inspect
 from collections.abc import Callable
+from functools import cache
 from math import isfinite
 from typing import Annotated, Any
 
@@ -46,7 +47,9 @@ def build() -> typer.Typer:
     return app
 
 
+@cache
 def built() -> Any:
+    """What `build` makes, as click has it; made once in a process, for all commands that are run in it."""
     return bounded(typer.main.get_command(build()))
 
 
@@ -82,10 +85,11 @@ def about(
     time_limit.start(time_limit.usual(context.invoked_subcommand) if limit is None else limit)
 
 
+@cache
 def options_by_name() -> dict[str, str]:
     """Long option of every command, by the name of the argument that it becomes."""
     result: dict[str, str] = {}
-    todo: list[Any] = [typer.main.get_command(build())]
+    todo: list[Any] = [built()]
     for command in todo:
         todo.extend(getattr(command, "commands", {}).values())
         for parameter in command.params:

@@ -1,6 +1,7 @@
 """Checks of a published site that several tests share."""
 
 import json
+from functools import lru_cache
 from html.parser import HTMLParser
 from pathlib import Path
 from urllib.parse import unquote, urlsplit
@@ -59,10 +60,16 @@ def check_whole(site: Path) -> Page:
     return first
 
 
+@lru_cache(maxsize=256)
+def _read(text: str) -> Page:
+    """Most pages are those of the site before."""
+    return Page(text)
+
+
 def _check_page(path: Path, site: Path, seen: set[Path]) -> Page:
     seen.add(path)
     text = path.read_text(encoding="utf-8")
-    page = Page(text)
+    page = _read(text)
     if path.name != "report.html":
         assert text.rstrip().endswith("</html>"), f"{path} is cut off"
         assert not page.open, f"{path}: {page.open} not closed"

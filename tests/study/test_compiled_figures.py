@@ -1,5 +1,7 @@
 """Figures of many designs, compiled, against one design's own margins, surveys of them in time."""
 
+import math
+
 import numpy as np
 import pytest
 
@@ -145,9 +147,11 @@ def test_rest_and_describing_function_change_the_slope_as_the_loops_do(point, ex
     assert mine == pytest.approx(truth.phase_margin_deg, rel=1e-6)
 
 
-@pytest.mark.parametrize("above", [1e-2, 1.0, 1e3, 1e5])
-def test_a_step_is_followed_for_as_long_as_its_resonance_rings(above):
-    """A resonance of 1 % damping, up to 140 dB above the gain at zero frequency."""
+@pytest.mark.parametrize(("above", "longest"), [
+    (1e-2, None), (1.0, None), (1e3, None), (1e5, None), (1.0, 2000)
+])  # fmt: skip
+def test_a_step_is_followed_for_as_long_as_its_resonance_rings(above, longest, monkeypatch):
+    """A resonance of 1 % damping, up to 140 dB above the gain at zero frequency; or for the longest time."""
     import control
 
     from actuator_lti.batch import _figures, _linalg, _step
@@ -156,16 +160,19 @@ def test_a_step_is_followed_for_as_long_as_its_resonance_rings(above):
     system = control.c2d(control.ss(50 * above * s / (s**2 + s + 2500) + 1 / (s + 1)), 1e-3)
     A, B, C = (np.asarray(part) for part in (system.A, system.B, system.C))
     n, p = len(A), np.linalg.eigvals(system.A)
-    row = np.zeros(_figures.COLUMNS)
+    row = np.full(_figures.COLUMNS, np.nan)
     row[_figures.RADIUS], row[_figures.FINAL] = np.abs(p).max(), (C @ np.linalg.solve(np.eye(n) - A, B))[0, 0]
     poles = np.concatenate((np.zeros(2 * n), p.real, p.imag))
     spaces, loop = (np.zeros(2 * n), np.zeros(2 * n * n + 2 * n)), [part.ravel().copy() for part in (A, B, C)]
     _linalg.hessenberg(n, *loop, np.zeros(n))
+    monkeypatch.setattr(_step, "LONGEST", longest or _step.LONGEST)
     _step.step_figures(n, *loop, np.nan, poles, row, *spaces)
     truth = step_figures(system)
-    assert row[_figures.SETTLING] == pytest.approx(truth.settling_time_s / 1e-3, abs=1e-6)
+    known = math.nan if longest else 1.0
+    settling, overshoot = known * truth.settling_time_s / 1e-3, known * truth.overshoot_percent
+    assert row[_figures.SETTLING] == pytest.approx(settling, abs=1e-6, nan_ok=True)
     assert row[_figures.RISE] == pytest.approx(truth.rise_time_s / 1e-3, abs=1e-6)
-    assert row[_figures.OVERSHOOT] == pytest.approx(truth.overshoot_percent, rel=1e-7)
+    assert row[_figures.OVERSHOOT] == pytest.approx(overshoot, rel=1e-7, nan_ok=True)
 
 
 def test_a_fundamental_of_very_many_states_has_exact_borders_and_a_reason() -> None:
