@@ -6,16 +6,19 @@ from functools import cache
 
 import numpy as np
 
+from actuator_lti.axis._search import half_turns
 from actuator_lti.errors import NumericalError
 from actuator_lti.margins.assemble import FARTHEST
 from actuator_lti.margins.axis_search import Factored, Found
 from actuator_lti.margins.tail import listed, turns
-from actuator_lti.margins.trust import Doubtful
+from actuator_lti.margins.trust import TOUCH, Doubtful
 from actuator_lti.types import Mask, Real
 
 _LOW, _HIGH = 1e-3, 1e3  # of the smallest and largest root: where the ends of the axis begin
 _NEAR_ONE = 1e-6
 _HARDLY = 1e-12  # rad
+_LEFT = 5.0  # times what the search does not tell from one
+_ONE = "the gain is one at an end of the axis"
 _FLOORS = (0.01, 0.1, 0.5, 0.9)  # gain: behind a delay margins are listed up to where L stays below
 _LEAST_GAIN = 1e-11
 _TOLD = 1e-12  # of the log gain, to either side of a place
@@ -99,10 +102,27 @@ def _start(factors: Factored, low: float) -> float:
     """Zero, or a frequency below which gain and phase follow the roots at zero."""
     order = factors.at_zero
     if not order:
-        if abs(factors.log_at(0.0)[0]) < _NEAR_ONE:
-            raise Doubtful("the gain is one at an end of the axis")
+        gain, phase = factors.log_at(0.0)
+        if factors.one_at_rest and abs(gain) <= TOUCH and math.cos(phase) > 0.0:
+            return _off_one(factors, low)
+        if abs(gain) < _NEAR_ONE:
+            raise Doubtful(_ONE)
         return 0.0
     return _told(factors, min(low, 0.1 * low * math.exp(-factors.log_at(low)[0] / order)), order)
+
+
+def _off_one(factors: Factored, end: float) -> float:
+    """A frequency at which the gain has left one for good, before the phase meets half a turn: L(0) is 1."""
+    while abs(factors.log_at(end)[0]) < 2.0 * _LEFT * factors.slack:
+        end *= 2.0
+        if not end < 1e150:
+            raise Doubtful(_ONE)
+    left = math.copysign(_LEFT * factors.slack, factors.log_at(end)[0])
+    passed = [factors.passages(0.0, end, level).size for level in (left, -left)]
+    phase = factors.along(0.0, end).known[:-1, [4, 6]]
+    if passed != [1, 0] or half_turns(phase.min()) != half_turns(phase.max()):
+        raise Doubtful(_ONE)
+    return end
 
 
 def _told(factors: Factored, end: float, slope: float) -> float:

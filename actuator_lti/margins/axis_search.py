@@ -54,6 +54,7 @@ class Factored:
     log_gain: float = 0.0  # the constant, so that gain and phase are those of L; the phase modulo a full turn
     phase: float = 0.0
     slack: float = 0.0  # how far the factors may be from the loop: log gain, and phase in rad
+    one_at_rest: bool = False  # whether a gain of one at zero frequency, within `TOUCH`, is no crossing
 
     @cached_property
     def at_zero(self) -> float:
@@ -72,7 +73,14 @@ class Factored:
         constant = float(-(weights * np.log(np.abs(roots))).sum())
         if self.at_infinity:
             roots, weights = np.append(roots, 0.0), np.append(weights, -self.at_infinity)
-        other = replace(self, roots=roots, weights=weights, log_gain=self.log_gain + constant, phase=0.0)
+        other = replace(
+            self,
+            roots=roots,
+            weights=weights,
+            log_gain=self.log_gain + constant,
+            phase=0.0,
+            one_at_rest=False,
+        )
         one = np.ones(1)
         phase = -float(self.log_value(one)[1][0] + other.log_value(one)[1][0])
         whole = (self.weights == np.round(self.weights)).all()  # behind part of a sample L is not real there

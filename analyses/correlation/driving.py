@@ -77,13 +77,14 @@ def readings(driven: Driven, record: Record) -> list[Driven]:
     Jumps in neighbouring rows are a curve or steps; a curve is smooth, or the drive takes it in straight
     lines or, as from a field bus, held until the next sample. Where the rows tell a grid on which it jumps,
     it is held, and each jump on the grid or, of a sender that is not punctual, at any tick before its row
-    (where more than a tick is left to them: rows at all phases show that the jumps are on their grid).
+    (where more than a tick is left to them, or none but a clock that is off makes the grid: otherwise rows at
+    all phases show that the jumps are on it).
     """
     early, tick_s = record.early_s, driven.design.controller.period_s
     held = replace(driven, together=len(record), between=HELD)
     row_s = float(record.time_s[-1] - record.time_s[0]) / max(len(record) - 1, 1)
     if (hold := hold_of(held.steps, len(record), row_s, tick_s)) is not None:
-        on_grid, anywhere = _on_grid(held, hold), hold.room_s > tick_s
+        on_grid, anywhere = _on_grid(held, hold), hold.room_s > tick_s or hold.tick_s != tick_s
         if early is None:
             return [on_grid, held] if anywhere else [on_grid]
         told = early[held.steps]

@@ -108,7 +108,8 @@ class Duty:
         return Verdict.of(all(stated) if stated else None)
 
 
-PERIODS, MANY = 3, 32  # of the motion that pass before one is taken; that are taken at the most
+PERIODS, MANY = 3, 32  # of the motion that pass at least before one is taken; that are taken at the most
+STEADY = 1e-4  # of the rms current: it differs by less, in no printed digit, after twice as many periods
 HOLD_S = 1.0
 MOST_TICKS = 2_000_000
 MOST_CYCLES = 2**40
@@ -163,7 +164,7 @@ def duty(design: AnyDesign, asked: Asked | None = None) -> Duty:
 
 
 def _moving(design: Design, asked: Asked) -> tuple[Trajectory, int]:
-    """The motion until it is steady, and the ticks of the periods that are taken."""
+    """The motion until it is steady, or as long as it may be, and the ticks of the periods that are taken."""
     Ts, size = design.controller.period_s, asked.size_of(design)
     every = round(design.controller.period_of(design.controller.outermost) / Ts)
     lowest = (PERIODS + 1) / (MOST_TICKS * Ts)
@@ -171,14 +172,26 @@ def _moving(design: Design, asked: Asked) -> tuple[Trajectory, int]:
         motion = f"a peak of {size:.4g} (in SI) at {asked.frequency_hz:.4g} Hz"
         raise InputError(f"{motion}: at least {lowest:.4g} Hz with this period")
     ticks = max(1, round(1.0 / (asked.frequency_hz * Ts * every))) * every
-    taken = _periods(design, asked, max(1, MOST_TICKS // ticks - PERIODS))
-    command, whole = commands.sine(size, 1.0 / (ticks * Ts)), (PERIODS + taken) * ticks
-    check_frequency(design, replace(command, highest_hz=max(asked.frequency_hz, command.highest_hz)))
-    if asked.ramp_s > 0.0:
-        time = np.arange(0, whole, every)
-        ends = np.array([0.0, asked.ramp_s / Ts, ticks - asked.ramp_s / Ts, ticks])
-        command = commands.sampled(time * Ts, np.interp(time % ticks, ends, [0.0, size, size, 0.0]))
-    return simulate(design, command, whole * Ts, asked.load_Nm), taken * ticks
+    taken = _periods(design, asked, max(1, MOST_TICKS // ticks - PERIODS)) * ticks
+    sine = commands.sine(size, 1.0 / (ticks * Ts))
+    check_frequency(design, replace(sine, highest_hz=max(asked.frequency_hz, sine.highest_hz)))
+    waited, before = PERIODS * ticks, inf
+    while True:
+        whole = waited + taken
+        command = (
+            sine if asked.ramp_s == 0.0 else _trapezoid(asked, size, np.arange(0, whole, every), Ts, ticks)
+        )
+        run = simulate(design, command, whole * Ts, asked.load_Nm)
+        rms = float(np.sqrt(np.mean(run.current_A[-taken:] ** 2)))
+        if abs(rms - before) <= STEADY * rms or whole + waited > MOST_TICKS:
+            return run, taken
+        waited, before = 2 * waited, rms
+
+
+def _trapezoid(asked: Asked, size: float, at: Floats, Ts: float, ticks: int) -> commands.Command:
+    """The command of a trapezoid of so many ticks, sampled at ticks."""
+    ends = np.array([0.0, asked.ramp_s / Ts, ticks - asked.ramp_s / Ts, ticks])
+    return commands.sampled(at * Ts, np.interp(at % ticks, ends, [0.0, size, size, 0.0]))
 
 
 def _periods(design: Design, asked: Asked, most: int) -> int:

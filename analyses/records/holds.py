@@ -102,12 +102,12 @@ def _hold_of(jumps: tuple[int, ...], count: int, row_s: float, tick_s: float) ->
     line = np.abs(np.fft.rfft(np.bincount(rows, minlength=FINER * int(rows[-1]))))
     tried = np.log(max(most, 1) * float(rows[-1]) / NO_CHANCE)
     for ticks in range(most, 0, -1):
-        by_chance = (len(rows) - 2) * np.log(max(ticks * tick, 1.0)) <= tried
-        if by_chance and not 1 == ticks < tick:  # a jump is at a tick
-            continue
-        if (found := _grid(rows, line, ticks * tick)) is None:
+        of_each, chance = np.log(max(ticks * tick, 1.0)), -1.0 if 1 == ticks < tick else tried  # at a tick
+        if (len(rows) - 2) * of_each <= chance or (found := _grid(rows, line, ticks * tick)) is None:
             continue
         period, numbers = found
+        if _not_foretold(numbers) * of_each <= chance:
+            continue
         whole = max(round(period / tick), 1)
         if _room(rows, numbers, whole * tick) > ROUNDING:
             period = whole * tick
@@ -123,6 +123,16 @@ def _hold_of(jumps: tuple[int, ...], count: int, row_s: float, tick_s: float) ->
             is_whole=abs(whole / period - round(whole / period)) * count < ON_TICKS,
         )
     return None
+
+
+def _not_foretold(numbers: Ints) -> int:
+    """How many jumps the two before them do not foretell, as they do those of a square wave.
+
+    >>> _not_foretold(np.array([0, 7, 16, 25, 34])), _not_foretold(np.arange(5))
+    (1, 3)
+    """
+    gaps = np.diff(numbers)
+    return int(np.count_nonzero((gaps[1:] != gaps[:-1]) | (gaps[1:] == 1)))
 
 
 def _grid(rows: Ints, line: Floats, nominal: float) -> tuple[float, Ints] | None:

@@ -18,9 +18,9 @@ _SHOWN = 400
 
 def section(result: Duty) -> doc.Section:
     intro = (
-        "The motion is simulated until it is steady, friction, play and limits at work, the overload "
-        "protection left out. Its current, repeated without end, heats the winding by its mean copper loss "
-        "and drives the overload state."
+        "The motion is simulated until its rms current is steady, friction, play and limits at work, the "
+        "overload protection left out. Its current, repeated without end, heats the winding by its mean "
+        "copper loss and drives the overload state."
     )
     note = f"Duty: {asked_words(result)}."
     if runs(result.design) and follows_angle(result.design) and result.asked.share < 1.0:

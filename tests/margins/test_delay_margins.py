@@ -1,12 +1,16 @@
 """Exact delays: against closed forms, whole samples as states, Walton and Marshall, and a dense grid."""
 
+import cmath
 import math
+from dataclasses import replace
+from fractions import Fraction
 
 import control
 import numpy as np
 import pytest
-from margin_truth import behind_delay, facts, unlike
+from margin_truth import behind_delay, facts, truth_of, unlike
 from mpmath import mp, mpf
+from scipy import signal
 from scipy.optimize import brentq
 
 from actuator_lti.margins import stability_margins
@@ -192,3 +196,24 @@ def test_an_unstable_loop_prints_the_delay_margin_that_it_quotes() -> None:
     assert result.delay_margin_s == 0.0
     assert "delay margin: 0 s, as it is not stable" in str(result)
     assert "delay to the border: " in str(result)
+
+
+@pytest.mark.parametrize("part", [Fraction(1, 2), Fraction(7, 3), Fraction(21, 2)])
+@pytest.mark.parametrize("loop", [
+    control.tf([0.5], [1.0, -0.5], 1.0),
+    control.tf([0.3, 0.2], [1.0, -0.8, 0.3], 1.0),
+    control.tf([2.0, -1.5], [1.0, -0.5], 1.0),  # the gain rises from one
+    control.tf(*signal.butter(4, 0.2), 1.0),  # it stays at one for long, and within rounding alone
+])  # fmt: skip
+def test_a_gain_of_one_at_rest_is_no_crossing_behind_part_of_a_sample(
+    loop: control.TransferFunction, part: Fraction
+) -> None:
+    """Lists by exact polynomials, unstable poles by the turn of 1 + L, at the end to the mean."""
+    m = stability_margins(loop, delay_s=float(part))
+    assert not m.withheld
+    inside = replace(facts(m), gains=[g for g in facts(m).gains if g[0] < np.pi], unstable=None)
+    assert unlike(inside, replace(truth_of(loop, part), unstable=None), 1e-6, 1e-3) is None
+    w = np.linspace(0.0, np.pi, 200_001)
+    F = 1.0 + loop(np.exp(1j * w)) * np.exp(-1j * w * float(part))
+    turn = float(np.unwrap(np.angle(F))[-1]) + cmath.phase(F[-1].real / F[-1])
+    assert m.agreement.unstable_nyquist == round(-turn / np.pi)

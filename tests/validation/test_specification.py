@@ -194,6 +194,17 @@ def test_the_peak_is_that_of_the_motion_repeated_without_its_start() -> None:
     assert there.peak_A == np.abs(there.current_A).max()
 
 
+@pytest.mark.parametrize(("integral_s", "load"), [(1.0, 4.0), (3.0, -4.0)])
+def test_the_motion_is_followed_until_a_slow_integral_carries_the_load(
+    integral_s: float, load: float
+) -> None:
+    """The rms current is that of a run of 40 integral times, of which the start is forgotten."""
+    design = changed(FIN, controller={"position": {"integral_time_s": integral_s}})
+    result = duty(design, Asked.of(design, amplitude_rad=0.1, frequency_hz=5.0, load_Nm=load))
+    long = simulate(design, commands.sine(0.1, 5.0), 40.0 * integral_s, load).current_A[-len(result.time_s) :]
+    assert result.rms_A == pytest.approx(np.sqrt(np.mean(long**2)), rel=5e-4)
+
+
 def test_the_overload_state_is_that_of_the_running_drive() -> None:
     """A short protection, so that a few seconds settle it: the largest state of the last period."""
     design = with_overrides(JOINT, {"limits.peak_time": "50 ms"})

@@ -65,8 +65,10 @@ def late_margins(given: Given, delay_s: float, band: tuple[float, float] | None)
         if loop.N.degree() < 0:  # nothing is fed back, early or late
             return replace(certified_margins(given, band), delay_s=delay_s)
         delays = (delay_s + way * ULP * float(np.spacing(delay_s)) for way in (0.0, 1.0, -1.0))
-        near = zip((loop, *neighbours(given, loop, told=0)), delays, strict=True)
-        base, *others = [_found(each, given.period_s, delay, band) for each, delay in near]
+        near = (loop, *neighbours(given, loop, told=0))
+        one = len({_above_one(each) for each in near}) > 1 or _above_one(loop) == 0
+        pairs = zip(near, delays, strict=True)
+        base, *others = [_found(each, given.period_s, delay, band, one) for each, delay in pairs]
     found, nyquist, poles = base
     if any(other != nyquist for _, other, _ in others):
         raise Doubtful(ACROSS)
@@ -91,14 +93,20 @@ def late_distances(given: Given, delay_s: float, distances: Sequence[Distance]) 
         loop = exact_loop(given)
         if loop.N.degree() < 0:
             return [(distance.at_no_gain, 0.0) for distance in distances]
-        return _along(loop, given.period_s, delay_s, None).nearest(distances)
+        return _along(loop, given.period_s, delay_s, None, True).nearest(distances)
+
+
+def _above_one(loop: ExactLoop) -> int:
+    """The sign of L(0) - 1: where neighbours do not share it, no crossing next to zero frequency is told."""
+    above, below = loop.N[0] * loop.D[0], loop.D[0] * loop.D[0]
+    return int(above > below) - int(above < below)
 
 
 def _found(
-    loop: ExactLoop, period_s: float | None, delay_s: float, band: tuple[float, float] | None
+    loop: ExactLoop, period_s: float | None, delay_s: float, band: tuple[float, float] | None, one: bool
 ) -> tuple[Along, int, int | None]:
     """What one of them does along the axis, and its unstable closed-loop poles by both ways."""
-    found, free = _along(loop, period_s, delay_s, band), loop.closed_poles
+    found, free = _along(loop, period_s, delay_s, band, one), loop.closed_poles
     nyquist = loop.poles.right - found.half_turns
     if period_s is not None or free.on_border:
         return found, nyquist, None
@@ -108,7 +116,7 @@ def _found(
 
 
 def _along(
-    loop: ExactLoop, period_s: float | None, delay_s: float, band: tuple[float, float] | None
+    loop: ExactLoop, period_s: float | None, delay_s: float, band: tuple[float, float] | None, one: bool
 ) -> Along:
     if loop.D.degree() < loop.degree:
         raise Doubtful("a pole at z = -1, where L behind part of a sample jumps")
@@ -118,6 +126,7 @@ def _along(
         with_delay(product.roots[0], product.weights, product),
         log_gain=math.log(abs(product.lead)),
         phase=math.pi * (loop.zeros.right - loop.poles.right + (product.lead < 0.0)),
+        one_at_rest=one,
     )
     return Along(factors, product, band).polish()
 
