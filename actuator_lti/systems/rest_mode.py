@@ -115,7 +115,8 @@ def _none_is_at_rest(ticks: _RoundTrip, c: np.ndarray) -> bool:
     Who passes has |M u| <= r T |u|, row by row, and so in any scales of rows and states a ratio of norms of M
     of no more than r |T|: the least singular value says that there is none.
     """
-    rows, terms, size = np.vstack([ticks.change, c]), np.vstack([ticks.terms, np.abs(c)]), 1.0
+    rows, terms = np.vstack([ticks.change, c]), np.vstack([ticks.terms, np.abs(c)])
+    size = np.ones(rows.shape[1])
     for _ in range(3):  # all terms of one size
         weight = (terms * size).max(axis=1, keepdims=True)
         weight = np.where(weight > 0.0, weight, 1.0)
