@@ -68,6 +68,8 @@ def _own(systems: Sequence[System], at: float, alone: bool) -> tuple[int, np.nda
     round_trip = _round_trip(As, at, holds)
     seen = np.vstack([C @ over for C, over in zip(Cs, round_trip.before, strict=True)])
     integrators = np.flatnonzero(holds | (len(As) > 1))
+    if not integrators.size or _none_is_at_rest(round_trip, seen):
+        return None
     found = [v for j in integrators if (v := _at_rest(round_trip, seen, int(j), alone)) is not None]
     if not found:
         return None
@@ -105,6 +107,23 @@ def _on_its_way(As: np.ndarray, v: np.ndarray) -> np.ndarray:
         after = A @ way[-1]
         way.append(np.where(np.abs(after) > ROUNDED * (np.abs(A) @ np.abs(way[-1])), after, 0.0))
     return np.array(way)
+
+
+def _none_is_at_rest(ticks: _RoundTrip, c: np.ndarray) -> bool:
+    """Whether nothing can pass `_at_rest`, whatever the state: one look in the place of one for each of them.
+
+    Who passes has |M u| <= r T |u|, row by row, and so in any scales of rows and states a ratio of norms of M
+    of no more than r |T|: the least singular value says that there is none.
+    """
+    rows, terms = np.vstack([ticks.change, c]), np.vstack([ticks.terms, np.abs(c)])
+    size = np.ones(rows.shape[1])
+    for _ in range(3):  # all terms of one size
+        weight = (terms * size).max(axis=1, keepdims=True)
+        weight = np.where(weight > 0.0, weight, 1.0)
+        size = np.abs(rows / weight).max(axis=0)
+        size = 1.0 / np.where(size > 0.0, size, 1.0)
+    least = np.linalg.svd(rows / weight * size, compute_uv=False)[-1]
+    return bool(least > ROUNDED * np.linalg.norm(terms / weight * size))
 
 
 def _at_rest(ticks: _RoundTrip, c: np.ndarray, j: int, alone: bool) -> np.ndarray | None:

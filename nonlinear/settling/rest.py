@@ -108,7 +108,7 @@ class _Watch:
     periods: int = 0  # gone by, leaps included
     times: list[Floats] = field(default_factory=list)
     seen: list[Floats] = field(default_factory=list)  # per piece: reference, followed, motor
-    extents: list[tuple[Floats, Floats]] = field(default_factory=list)  # per piece, of followed and motor
+    extents: list[list[list[float]]] = field(default_factory=list)  # per piece, of followed and motor
     ranges: list[tuple[Floats, Floats]] = field(default_factory=list)  # per piece, of _RANGED
     acted: list[tuple[int, int, int]] = field(default_factory=list)  # entries, flags, events
     left: list[Floats] = field(default_factory=list)  # of each breakaway: `_breakaways`
@@ -154,7 +154,8 @@ class _Watch:
         self.times.append(self.period_s * np.arange(self.periods, self.periods + periods, dtype=float))
         self.periods += periods
         self.seen.append(self._signals(piece.columns))
-        self.extents.append((self.seen[-1][1:].min(axis=1), self.seen[-1][1:].max(axis=1)))
+        moved = self.seen[-1][1:]
+        self.extents.append([moved.min(axis=1).tolist(), moved.max(axis=1).tolist()])
         flags = int(np.bitwise_or.reduce(piece.flags))
         self.acted.append((periods, flags, piece.events))
         ranged = piece.columns[_RANGED]
@@ -254,14 +255,16 @@ class _Watch:
         far = max([self._least, *(1.0 / each for each in counts if each > 0.0)])
         near = np.abs(left[2:4] - left[2:4, -1:]).max(axis=0, initial=0.0) <= far
         like = np.flatnonzero(near & (left[4] == left[4, -1:]))[::-1]
-        if like.size < 3 or self._extent(int(left[1, like[-1]])) <= far:
+        spans = self._spans_from(left[1])[like]
+        if like.size < 3 or spans[-1] <= far:
             return None  # no swing that a sensor counts
-        moved = np.concatenate(self.seen, axis=1)[1:]
+        moved = np.empty((0, 0))
         for turns in range(1, (like.size - 1) // 2 + 1):
             each = like[2 * turns :: -turns]  # the breakaway that this is, a period ago, two
             (before, now), (first, middle, last) = np.diff(left[0, each]), left[1, each].astype(int)
-            if each[2] - each[1] != each[1] - each[0] or not _alike(before, now):
+            if each[2] - each[1] != each[1] - each[0] or spans[turns] <= far or not _alike(before, now):
                 continue
+            moved = moved if moved.size else np.concatenate(self.seen, axis=1)[1:]
             span, seen = _span(moved[:, middle:last]), left[:, each[0] :]
             if span > far and _alike(span, _span(moved[:, first:middle])):
                 n = next((n for n in range(1, each[2] - each[1] + 1) if _repeated(seen, n, span)), 0)
@@ -269,11 +272,11 @@ class _Watch:
                     return _Swing(2, (seen.shape[1] - 1) / n / (before + now), alike=True), middle
         return None
 
-    def _extent(self, entry: int) -> float:
-        """Span of all that moved from the piece of an entry on."""
-        piece = np.searchsorted(np.cumsum([one[0] for one in self.acted]), entry, side="right")
-        low, high = np.moveaxis(np.array(self.extents[piece:]), 1, 0)
-        return float((high.max(axis=0) - low.min(axis=0)).max())
+    def _spans_from(self, entries: Floats) -> Floats:
+        """Spans of all that moved from the pieces of entries to the end."""
+        low, high = np.moveaxis(np.array(self.extents)[::-1], 1, 0)
+        spans = (np.maximum.accumulate(high) - np.minimum.accumulate(low)).max(axis=1)[::-1]
+        return spans[np.searchsorted(np.cumsum([one[0] for one in self.acted]), entries, side="right")]
 
     def _still(self, piece: Piece) -> bool:
         """Whether all signals keep their values; of a speed drive, all but the angles."""

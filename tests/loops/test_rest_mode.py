@@ -246,6 +246,12 @@ def test_nothing_else_is_taken_out(seed: int) -> None:
     assert not without_rest_mode(A, B, C, 1.0)[3].all()
 
 
+def test_a_drive_that_hides_no_mode_is_told_at_one_look(monkeypatch) -> None:
+    """A solution for each state of each of its systems was half the time of its loops."""
+    monkeypatch.setattr("actuator_lti.systems.rest_mode._at_rest", lambda *_: pytest.fail("asked of a state"))
+    assert len(assemble_loops("ilr33-amber-multirate").present) == 3
+
+
 def test_both_sides_and_values_that_are_not_finite() -> None:
     A = np.array([[1.0, 0.0, 0.5], [0.0, 0.3, 0.2], [0.0, 0.1, 0.4]])  # fed by the third state: the dual
     B = np.array([[0.0], [1.0], [0.0]])

@@ -318,3 +318,16 @@ def test_a_stiff_drive_is_left_where_its_work_ends() -> None:
     assert rest.verdict == "still moving"
     assert 200_000 <= rest.work < 200_000 + 2 * 512 * 2 * 2**15
     assert rest.after_s < 64 * design.controller.period_s
+
+
+def test_swings_below_a_count_are_not_measured_at_every_breakaway(monkeypatch: pytest.MonkeyPatch) -> None:
+    """They were as often as breakaways squared: a fin that hunts about an edge of a count took 80 s."""
+    integral = {"integral_time_s": 2.0, "sensor": "output"}
+    fin = changed(
+        load_design("fin"), output_encoder={"counts_per_rev": 8192}, controller={"position": integral}
+    )
+    measured = list[tuple[int, ...]]()
+    monkeypatch.setattr("nonlinear.settling.rest._span", lambda moved: measured.append(moved.shape))
+    found = judge(simulate(fin, commands.step(np.radians(2.0)), 0.5).running)
+    assert (found.verdict, measured) == ("limit cycle", [])
+    assert 2.0 * found.amplitude < 2.0 * np.pi / 8192
