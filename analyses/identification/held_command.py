@@ -182,7 +182,7 @@ class _Search:
             left = np.array([np.std(rest) for rest in rests])
             sizes = sizes * left
             unlikely = float(2.0 * rows @ np.log(sizes))
-            if found is not None and unlikely > found.unlikely:
+            if found is not None and moves.max() >= SETTLED and unlikely > found.unlikely:
                 found, moves = replace(found, parts=here), 0.5 * moves
                 if moves.max() < SETTLED:
                     break
