@@ -159,10 +159,12 @@ class _Search:
         """Search from ``start``, each signal weighed by what is left of it, until that settles.
 
         Given up where it lacks more of being as likely as another, ``than``, than its last round has gained.
+        Rows moved to where the records are less likely go half the way back, as far as they are sure.
         """
-        design, keys, parts = self.design, self.keys, list(parts)
+        design, keys, here, parts = self.design, self.keys, parts, list(parts)
         measured = [measured_signals(design, part) for part in parts]
-        wanted, before = _drives(measured), np.inf
+        wanted, before, moves = _drives(measured), np.inf, np.zeros(len(parts))
+        found: _Likeliest | None = None
         rows = np.array([len(one) for one in wanted])
 
         def weighed(signals: Sequence[Floats]) -> Floats:
@@ -180,16 +182,26 @@ class _Search:
             left = np.array([np.std(rest) for rest in rests])
             sizes = sizes * left
             unlikely = float(2.0 * rows @ np.log(sizes))
+            if found is not None and unlikely > found.unlikely:
+                found, moves = replace(found, parts=here), 0.5 * moves
+                if moves.max() < SETTLED:
+                    break
+                parts = [_halfway(*pair) for pair in zip(here, parts, strict=True)]
+                start, sizes = found.design, found.sizes
+                continue
+            here = list(parts)
             told = [(w / size, e / size) for w, e, size in zip(slopes, rests, left, strict=True)]
-            gram, moves = np.sum([w.T @ w for w, _ in told], axis=0), np.zeros(len(parts))
+            gram = np.sum([w.T @ w for w, _ in told], axis=0)
             for k, part in enumerate(parts):
                 pair, at = slice(2 * k, 2 * k + 2), (start, part)
                 parts[k], told[pair], moves[k] = _at_its_rows(*at, sizes[pair], told[pair], gram, turn == 0)
             settled = np.all(np.abs(left - 1.0) < SETTLED) and moves.max() < SETTLED
+            found = _Likeliest(_one_constant(design, start), keys, list(parts), sizes, told, unlikely)
             if settled or before - unlikely < unlikely - than:
                 break
             before = unlikely
-        return _Likeliest(_one_constant(design, start), keys, parts, sizes, told, unlikely)
+        assert found is not None  # there is a first round
+        return found
 
     def at_its_ticks(self, found: _Likeliest) -> Fit:
         """The fit with the steps of each command at the ticks with which the records are likeliest.
@@ -247,6 +259,11 @@ def _at_its_rows(
     w = w - np.outer(column, column @ w / (column @ column + known))
     own = list(zip(np.split(w, 2), (rest for _, rest in told), strict=True))
     return replace(part, early_s=np.asarray(part.early_s) + more), own, abs(more) * float(np.sqrt(sure))
+
+
+def _halfway(one: Record, other: Record) -> Record:
+    """A record with its rows in the middle between two places."""
+    return replace(one, early_s=0.5 * (np.asarray(one.early_s) + np.asarray(other.early_s)))
 
 
 def _values(design: Design, keys: Sequence[str]) -> Floats:
