@@ -68,6 +68,7 @@ def read_quantity(option: str, words: str | None, kind: Kind, drive: Design, uni
     """
     from actuator_lti.design.field import Structure
     from actuator_lti.design.stated import Frame
+    from actuator_lti.design.units import parse_limit
 
     if words is None:
         return None
@@ -87,8 +88,9 @@ def read_quantity(option: str, words: str | None, kind: Kind, drive: Design, uni
     if bare is not None and not isfinite(bare):
         raise InputError(f"{option} {words}: must be a finite number")
     try:
-        frame = Frame(Structure.of(drive), drive.motor.constants)
-        return frame.limit(words, unit or "1") if bare is None else bare
+        if bare is None and unit == "A":
+            return Frame(Structure.of(drive), drive.motor.constants).limit(words, unit)
+        return parse_limit(words, unit or "1") if bare is None else bare
     except InputError as error:
         reason = error.message.partition("allowed:")[0].rstrip("; ") or "the motor's amperes are dc"
         raise InputError(f"{option} {words!r}: {reason}; allowed: {allowed}") from None
