@@ -30,8 +30,10 @@ BELOW_NYQUIST = 0.45  # of the sampling rate: at 0.5 a held moment does not move
 LOST_MOTION_SHARE = 0.03  # of the rated moment
 _AROUND = np.linspace(-1.0, 1.0, 17)  # of the spacing of the frequencies, a quarter as wide every round
 _ROUNDS = 12
-_REST_HZ, _SLOW_HZ = 1e-12, 1e-5  # where the limit at zero frequency is read; its slope
-_AWAY = 1e-3  # of the stiffness at `_SLOW_HZ` is left at `_REST_HZ`: 1e-7 by one free integration
+# Where the limit at zero frequency is read, above the rounding of a pole there that no load moves (that of a
+# speed drive, whose integral holds the angle); its slope
+_REST_HZ, _SLOW_HZ = 1e-9, 1e-5
+_AWAY = 1e-3  # of the stiffness at `_SLOW_HZ` is left at `_REST_HZ`: 1e-4 by one free integration
 
 
 @dataclass(frozen=True)

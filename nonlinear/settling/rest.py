@@ -303,8 +303,7 @@ class _Watch:
 
     def _faint(self, swing: _Swing) -> bool:
         """Whether the swings of the last half of the entries move next to nothing, and do not grow."""
-        seen = np.concatenate(self.seen, axis=1)[1:]
-        late = seen[:, seen.shape[1] // 2 :]
+        late = self._half()[1][1:]
         if self._turning or swing.periods < PERIODS or np.ptp(late, axis=1).max() > self._least:
             return False
         first, second = (float(np.ptp(part, axis=1).max()) for part in np.array_split(late, 2, axis=1))
@@ -326,8 +325,7 @@ class _Watch:
 
     def _motor_keeps_on(self) -> bool:
         """Whether the motor swings in the last half of the entries, and as far at its end."""
-        motor = np.concatenate(self.seen, axis=1)[2]
-        early, late = (float(np.ptp(part)) for part in np.array_split(motor[motor.size // 2 :], 2))
+        early, late = (float(np.ptp(part)) for part in np.array_split(self._half()[1][2], 2))
         return early > 0.0 and _alike(early, late)
 
     def _late(self) -> list[tuple[int, int, int]]:
@@ -340,16 +338,26 @@ class _Watch:
             left -= one[0]
         return result
 
+    def _half(self) -> tuple[Floats, Floats]:
+        """Times and signals of the last half of the entries."""
+        entries = sum(map(len, self.times))
+        first, left = len(self.times), entries - entries // 2
+        while left > 0:
+            first -= 1
+            left -= len(self.times[first])
+        times, seen = np.concatenate(self.times[first:]), np.concatenate(self.seen[first:], axis=1)
+        return times[-left:], seen[:, -left:]
+
     def _swing(self) -> _Swing:
         """The swings of the last half of the entries, of whatever moves most."""
-        times, seen = np.concatenate(self.times), np.concatenate(self.seen, axis=1)
-        half = slice(times.size // 2, None)
-        return _swing_of(times[half], seen[1 + int(np.argmax(np.ptp(seen[1:, half], axis=1))), half])
+        times, seen = self._half()
+        return _swing_of(times, seen[1 + int(np.argmax(np.ptp(seen[1:], axis=1)))])
 
     def _rest(self, verdict: Verdict, swing: _Swing | None = None, since: int | None = None) -> Rest:
         """What is known by now; of the last half of the entries, or of those ``since`` one."""
-        seen = np.concatenate(self.seen, axis=1)
-        command, followed, motor = seen[:, seen.shape[1] // 2 if since is None else since :]
+        command, followed, motor = (
+            self._half()[1] if since is None else np.concatenate(self.seen, axis=1)[:, since:]
+        )
         still, p = verdict == "at rest", self.drive.p
         acted = self._late()[: 1 if still else None]
         end = followed[-1] if still else 0.5 * (followed.max() + followed.min())

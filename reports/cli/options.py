@@ -64,7 +64,10 @@ def read_quantity(option: str, words: str | None, kind: Kind, drive: Design, uni
 
     In SI a position, speed or load at the output, in its usual unit the outermost loop's command; the
     drive's axis and outermost loop say the unit. A plain number is in ``unit``. ``option``: for the message.
+    Amperes of an AC motor are read as in its file; a plain number is of the model's.
     """
+    from actuator_lti.design.field import Structure
+    from actuator_lti.design.stated import Frame
     from actuator_lti.design.units import parse_limit
 
     if words is None:
@@ -78,14 +81,18 @@ def read_quantity(option: str, words: str | None, kind: Kind, drive: Design, uni
 
             unit, _ = COMMAND_UNITS[drive.axis, drive.controller.outermost]
         allowed = f'"5 {unit}", or 5 in {unit}' if unit else 'a number such as 0.5 or "50 %"'
+        if unit == "A" and drive.motor.constants != "dc":
+            allowed = '"5 A rms", "5 A peak", or 5 in A dc'
     with suppress(ValueError):
         bare = None if kind in ("output", "speed") else float(words)
     if bare is not None and not isfinite(bare):
         raise InputError(f"{option} {words}: must be a finite number")
     try:
+        if bare is None and unit == "A":
+            return Frame(Structure.of(drive), drive.motor.constants).limit(words, unit)
         return parse_limit(words, unit or "1") if bare is None else bare
     except InputError as error:
-        reason = error.message.partition("; allowed")[0]
+        reason = error.message.partition("allowed:")[0].rstrip("; ") or "the motor's amperes are dc"
         raise InputError(f"{option} {words!r}: {reason}; allowed: {allowed}") from None
 
 

@@ -16,7 +16,9 @@ from actuator_lti.errors import InputError, UnstableError
 from analyses.duty import Asked as AskedDuty
 from analyses.duty import duty
 from analyses.failures import Asked, failures
+from analyses.request import Kind
 from reports.charts.svg import draw_svg
+from reports.cli.options import read_quantity
 from reports.sections.duty import section as duty_section
 from reports.sections.failures import section as failures_section
 from tests.changed import changed
@@ -32,6 +34,27 @@ RUNAWAY = (kM * U / R - C0) / (b + kM * kE / R)
 
 
 failed = lru_cache(failures)
+
+
+@pytest.mark.parametrize("kind", ["plain", "command"])
+def test_amperes_of_the_command_line_are_those_of_a_file(kind: Kind) -> None:
+    """i = sqrt(3/2) I_rms = sqrt(3)/2 I_peak of an AC motor; which ones are meant has to be said."""
+    servo = changed(
+        load_design("ballscrew"), controller={"velocity": None, "position": None}, requirements=()
+    )
+    for words, dc_A in (("2 A peak", sqrt(3.0)), ("2 A rms", sqrt(6.0)), ("2 A dc", 2.0), ("2", 2.0)):
+        assert read_quantity("--current", words, kind, servo, "A") == pytest.approx(dc_A, rel=1e-15)
+    for words, drive, told in (
+        (
+            "2 A",
+            servo,
+            'which amperes of the AC motor is not said; allowed: "5 A rms", "5 A peak", or 5 in A dc',
+        ),
+        ("2 A peak", TORQUE, 'the motor\'s amperes are dc; allowed: "5 A", or 5 in A'),
+    ):
+        with pytest.raises(InputError) as refused:
+            read_quantity("--current", words, kind, drive, "A")
+        assert refused.value.message == f"--current {words!r}: {told}"
 
 
 def test_a_trapezoid_of_speed_is_inertia_and_friction() -> None:

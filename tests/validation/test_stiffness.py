@@ -101,6 +101,19 @@ def test_friction_of_several_slopes_is_checked_on_its_first(
     assert max(check.difference for check in check_stiffness(design, [2.0, 10.0])) < 1e-8
 
 
+@pytest.mark.parametrize("name", ["ballscrew", "ilr33-amber", "ilr33-amber-multirate"])
+def test_a_speed_drive_holds_by_the_integral_of_its_speed(name: str) -> None:
+    """kM Kp/Tn at the motor, the spring behind it; a sum of differences is the angle itself."""
+    open_position = {"controller": {"position": None}, "load": {"path": "back-drivable"}, "requirements": ()}
+    encoder = {"speed": "difference", "counts_per_rev": 4096}
+    design = changed(load_design(name), encoder=encoder, friction={"load_coefficient": 0.0}, **open_position)
+    velocity, kM = design.controller.velocity, design.effective_motor.torque_constant_Nm_A
+    compliance_rad_Nm = velocity.integral_time_s / (kM * velocity.gain * design.total_ratio**2)
+    spring = 0.0 if design.coupling is None else 1.0 / design.coupling.stiffness_Nm_rad
+    found = drive_figure(design, "static_stiffness")
+    assert found == pytest.approx(1.0 / (compliance_rad_Nm + spring), rel=3e-7)
+
+
 def test_an_integral_on_the_output_comes_back_and_a_self_locking_gear_does_not_move() -> None:
     assert stiffness_curves(load_design("joint"))[0].static_Nm_rad == float("inf")
     rigid = stiffness(load_design("ilr33-amber"))
