@@ -114,8 +114,10 @@ def _doubles(exact: acb_mat) -> Complex:
     return np.where(np.abs(out) < _VANISHED, 0.0, out)
 
 
-def rational_motion(system: Any, loop: RationalLoop) -> tuple[Motion, float]:
+def rational_motion(system: Any, loop: RationalLoop) -> tuple[Motion, float, int]:
     """The motion and the final value of the unit step response of a stable rational system.
+
+    And how many modes on the stability boundary it does not show, those at zero frequency left out.
 
     ``loop`` is the same, balanced (which is exact). Of the system itself the transfer function follows
     exactly from its doubles, its roots are isolated in certified balls, and the coordinates of the motion are
@@ -137,7 +139,8 @@ def rational_motion(system: Any, loop: RationalLoop) -> tuple[Motion, float]:
             poles = [(1 + p) / (1 - p) for p in poles]
         return _free_motion(acb_poly(arb_poly(rest)), poles, exact.sampled)
 
-    return at_enough_bits(motion, _FIRST_BITS, "a pole of the step response"), final
+    hidden = exact.hidden_modes.on_border - exact.hidden_modes.at_zero + exact.hidden_at_end
+    return at_enough_bits(motion, _FIRST_BITS, "a pole of the step response"), final, hidden
 
 
 def _in_z(p: fmpq_poly, degree: int) -> fmpq_poly:
@@ -150,8 +153,8 @@ def _poles(exact: ExactLoop, loop: RationalLoop) -> list[acb]:
     """All that the response shows, each as often as it is repeated, the slowest first; in s."""
     poles = exact.poles
     hidden = (p for p in exact.hidden_modes.roots if not p.contains(0) and not near_dc(p, loop))
-    at_end = exact.degree > exact.D.degree() or exact.hidden_at_end
-    if poles.right or poles.on_border > poles.at_zero or at_end or not all(p.real < 0 for p in hidden):
+    at_end = exact.degree > exact.D.degree()
+    if poles.right or poles.on_border > poles.at_zero or at_end or any(p.real > 0 for p in hidden):
         raise InputError(UNSTABLE)
     if poles.at_zero:
         raise InputError(_INTEGRATES if poles.at_zero == 1 else UNSTABLE)

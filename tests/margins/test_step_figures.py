@@ -88,6 +88,18 @@ def test_refusals(system: control.LTI, message: str) -> None:
     refused(step_figures, system, match=message)
 
 
+@pytest.mark.parametrize(("system", "settling_s"), [
+    (control.tf([1, 0, 4], [1, 1, 4, 4]), math.log(50.0)),  # 1/(s + 1) beside a pair at 2 rad/s
+    (control.tf([1, 1], [1, 0.5, -0.5], 0.1), 0.6),  # 1/(z - 1/2) beside z = -1: 2^-6 is the first below 2 %
+])  # fmt: skip
+def test_undamped_modes_that_the_response_does_not_show_are_told(
+    system: control.LTI, settling_s: float
+) -> None:
+    figures = step_figures(system)
+    assert figures.settling_time_s == pytest.approx(settling_s, rel=1e-12)
+    assert any("that the response does not show" in note for note in figures.notes)
+
+
 def test_what_no_time_is_enough_for_is_a_numerical_failure() -> None:
     """Ten of the longest delay are 1e7 of the shortest."""
     late = DelaySystem.from_system(control.tf([1], [1, 1])) * DelaySystem.delay(1.0)
