@@ -17,7 +17,7 @@ from actuator_lti.types import Compared, Real
 
 _SHOWN = 2000
 _EPS = float(np.finfo(float).eps)
-_HIDDEN = ("modes on the stability boundary that the response does not show: inside, nothing damps them",)
+_HIDDEN = "modes on the stability boundary that the response does not show: inside, nothing damps them"
 _TIE = 1e-12  # a sample this near to a level has reached it, and this near to the band is inside
 
 
@@ -91,7 +91,9 @@ def step_figures(system: Any) -> StepFigures:
         )
     loop = rational_loop(system)
     motion, final, hidden = rational_motion(system, loop)
-    return _figures(motion, final, period_s=loop.period_s, notes=_notes(loop) + _HIDDEN[: hidden > 0])
+    return _figures(
+        motion, final, period_s=loop.period_s, notes=(*_notes(loop), *([_HIDDEN] if hidden else ()))
+    )
 
 
 def _figures(

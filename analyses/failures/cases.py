@@ -25,7 +25,7 @@ from analyses.large_signal.tones import full_command
 from analyses.linear.loop_figures import all_loop_figures
 from nonlinear import Drive, Rows, State
 from nonlinear.runs.running import Piece, Running
-from nonlinear.runs.trajectory import COMMAND_UNITS
+from nonlinear.runs.trajectory import COMMAND_UNITS, followed_at
 
 Sensing = Callable[[State], State]
 Driving = Callable[[float, float], float]
@@ -87,9 +87,7 @@ class Rig:
 
     def followed(self, piece: Piece) -> Floats:
         """What the command orders, at each tick: position or speed at the output, current, voltage."""
-        places = {"velocity": 2, "current": 3, "voltage": 4}
-        seen = piece.columns[places.get(stage := self.design.controller.outermost, 1)]
-        return seen / self.design.total_ratio if stage == "velocity" else seen
+        return followed_at(self.design.controller.outermost, self.design.total_ratio, piece.signal)
 
     @property
     def turning(self) -> dict[str, str]:

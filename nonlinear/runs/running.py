@@ -37,6 +37,10 @@ class Piece:
     events: int  # landings, breakaways, reversals and contacts within it
     status: Status
 
+    def signal(self, name: str) -> Floats:
+        """A signal by its name in a run; those of probes have none here."""
+        return self.columns[at.SIGNALS[: at.BASE_SIGNALS].index(name)]
+
 
 @dataclass(eq=False)
 class Running:

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, partial
 from os import PathLike
 from typing import TYPE_CHECKING, Any, Literal, get_args
 
@@ -52,6 +52,15 @@ ADVICE: dict[Status, str] = {
     "not finite": "the state grew without bound: the loop is unstable; lower the gain or set limits",
     "cancelled": "the run was stopped before its end",
 }
+
+
+def followed_at(stage: Stage, ratio: float, signal: Callable[[str], Floats]) -> Floats:
+    """What a command of a stage orders, in its unit, by the names of signals: output angle or speed, current,
+    voltage.
+    """
+    if stage == "velocity":
+        return signal("motor_speed_rad_s") / ratio
+    return signal({"current": "current_A", "voltage": "voltage_V"}.get(stage, "output_angle_rad"))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -215,9 +224,7 @@ class Trajectory(Compared):
     @property
     def followed(self) -> Floats:
         """What the command orders, in the command's unit: output angle or speed, current, voltage."""
-        if self.stage == "velocity":
-            return self.motor_speed_rad_s / self.ratio
-        return {"current": self.current_A, "voltage": self.voltage_V}.get(self.stage, self.output_angle_rad)
+        return followed_at(self.stage, self.ratio, partial(getattr, self))
 
     @property
     def advice(self) -> str:

@@ -94,14 +94,13 @@ def crossings(
     one, which is no crossing; between two crossings L that stays so close to the line only touches it in any
     case.
     """
-    lines, (circle, axis) = _lines(loop), _lines(near)
+    (circle, axis), (circle_near, axis_near) = _lines(loop), _lines(near)
     both = (loop.N[0], loop.D[0]), loop.at_end
     touched = [
-        merge and lines[0].p[k] != 0 and _near_one(*end)
-        for k, end in zip((0, loop.degree), both, strict=True)
+        merge and circle.p[k] != 0 and _near_one(*end) for k, end in zip((0, loop.degree), both, strict=True)
     ]
-    gains = lines[0].met(circle.turns, touched)
-    reals = [c for c in lines[1].met(axis.turns) if c.L.real < 0.0]
+    gains = circle.met(circle_near.turns, touched)
+    reals = [c for c in axis.met(axis_near.turns) if c.L.real < 0.0]
     first, last = (
         [Crossing(w, complex(float(arb(n) / arb(d))))] if n * d < 0 else []
         for w, (n, d) in zip((0.0, math.inf), both, strict=True)
