@@ -20,7 +20,7 @@ from actuator_lti.files.reading import Tree
 from analyses.large_signal.classify import FRICTION_DB, FRICTION_DEG, STICK_FRACTION
 from analyses.large_signal.tones import LEAST_UPDATES, full_command
 from analyses.linear.loop_figures import HELD
-from analyses.monte_carlo.judging import in_populations
+from analyses.monte_carlo.judging import in_populations, loops_of
 from nonlinear.export import linear, page
 from nonlinear.export.c_files import exported_row
 from nonlinear.export.relations import relation_statements
@@ -62,7 +62,7 @@ def live_model(design: Design, source: str | None = None) -> Tree:
         "lines": result.lines,
         "row": [value if math.isfinite(value) else str(value) for value in map(float, row)],
         "places": {**page.PLACES, "outer": outer},
-        "loops": [name for name in LOOPS if name in design.controller.stages],
+        "loops": loops_of(design),
         "stages": {name: k for k, name in enumerate(LOOPS)},
         "points": POINTS,
         "point": _point(design),
@@ -119,8 +119,7 @@ def _judged(
 
     ``figures``: those of the whole drive that follow, each with its statements.
     """
-    stages = tuple(name for name in LOOPS if name in design.controller.stages)
-    followed: list[Tree] = []
+    stages, followed = loops_of(design), list[Tree]()
     apart: list[Tree] = []
     for item in design.requirements:
         words, load = QUANTITIES[item.quantity].words, item.load_Nm or 0.0
