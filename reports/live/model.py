@@ -28,6 +28,7 @@ from reports.live.charts import BORDERS
 from reports.live.keys import Figure, followed
 from reports.live.text import patches
 from reports.sections.limits import COLOURS, WORDS
+from reports.sections.names import command_unit
 from reports.sections.requirements import limit_words
 
 CONTACT = 'The coupling of the loops is in contact, its torque in the direction of motion ("driving").'
@@ -138,13 +139,10 @@ def _judged(
 
 def _step(design: Design) -> Tree:
     """Give the command of the step (a tenth of the largest), and what it is a step of."""
-    linear_axis, full, outermost = design.axis == "linear", full_command(design), design.controller.outermost
-    if outermost == "position":
-        unit, factor = ("mm", 1e-3) if linear_axis else ("deg", math.pi / 180.0)
-        return {"size": 0.1 * full, "unit": unit, "factor": factor, "of": "output"}
-    if outermost == "velocity":
-        return {"size": 0.1 * full, "unit": "m/s" if linear_axis else "rad/s", "factor": 1.0, "of": "speed"}
-    return {"size": 0.1 * full if math.isfinite(full) else 1.0, "unit": "A", "factor": 1.0, "of": "current"}
+    full, (scale, unit) = full_command(design), command_unit(design)
+    of = {"position": "output", "velocity": "speed"}.get(design.controller.outermost, "current")
+    size = 0.1 * full if math.isfinite(full) else 1.0
+    return {"size": size, "unit": unit, "factor": 1.0 / scale, "of": of}
 
 
 def _map(design: Design) -> Tree | None:
