@@ -246,6 +246,7 @@ def test_signals_are_named_and_printing_says_what_it_is() -> None:
     assert assemble_loops(amber(), "continuous").position.open_loop.input_labels == ["e_th"]
     loops = assemble_loops(amber(2, 10))
     assert repr(loops) == "Loops(amber: current, velocity, position; sampled, sliding, 0 N m, rotor free)"
+    assert "0 N, rotor" in repr(assemble_loops("ballscrew"))
     expected = "Loop(at u, broken at u, in V, every 0.1 ms, fundamental of a periodic loop)"
     assert repr(loops.break_points["u"]) == expected
     assert repr(assemble_loops(amber(), "ideal").velocity).endswith("in rad/s, continuous)")

@@ -137,6 +137,10 @@ def test_variants_differ_by_what_was_changed_and_by_nothing_else(compared):
     shares = {p.path: p.amount for p in both.moved_by["position.phase_margin"]}
     alone = compared.variants[1].differences["position.phase_margin"]
     assert shares["control.velocity.gain"] == pytest.approx(alone, rel=1e-6)
+    tables = [block for part in section(compared) for block in walk(part) if block["kind"] == "table"]
+    shown = {cell for one in tables for row in one["rows"] for key, cell in row.items() if key == "unit"}
+    assert {"N m/rad", "deg/s", ""} <= shown
+    assert not any("*" in unit or "^" in unit for unit in shown)  # as everywhere else
     ends = {name.key: compared.ends(name) for name in compared.names}
     best, worst = ends["velocity.gain_margin"]
     assert best > worst
