@@ -143,10 +143,10 @@ class Live:
         return path
 
 
-def command_line(path: Path | str, part: str = "loops") -> Any:
+def command_line(path: Path | str) -> Any:
     done = CliRunner().invoke(build(), ["margins", str(path), "--json"])
     assert done.exit_code in (0, 1), done.output
-    return json.loads(done.stdout)[part]
+    return json.loads(done.stdout)
 
 
 def verdicts_agree(page: Page, verdicts: list[dict[str, Any]]) -> None:
