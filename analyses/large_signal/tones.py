@@ -15,7 +15,7 @@ from actuator_lti.drive.profile import command_mean
 from actuator_lti.drive.steady import steady_input
 from actuator_lti.errors import InputError, NumericalError
 from actuator_lti.loops import Loops
-from actuator_lti.loops.tick import mean_response
+from actuator_lti.loops.tick import compose, mean_response
 from actuator_lti.systems.resolvent import states_at
 from analyses.large_signal.classify import FULL_TRIANGLE, STEADY
 from analyses.linear.responses import response_at
@@ -75,11 +75,9 @@ def linear_steady_state(loops: Loops, omega_rad_s: np.ndarray) -> LinearSteadySt
     Ts, M = loops.design.controller.period_s, system.ticks
     angle = [system.outputs.index("output_angle")]
     steps = [(A, B[:, :1], C[angle], D[angle, :1]) for A, B, C, D in map(system.matrices, range(M))]
-    A, B = np.eye(len(system.states)), np.zeros(len(system.states))
-    for A_j, B_j, _, _ in steps:
-        A, B = A_j @ A, A_j @ B + B_j[:, 0]
+    A, B = compose([system.program.tick(k) for k in range(M)])
     z = np.exp(1j * omega_rad_s * M * Ts)
-    x = states_at(A, B[:, None], z)[..., 0]
+    x = states_at(A, B[:, :1], z)[..., 0]
     output = mean_response(steps, np.exp(1j * omega_rad_s * Ts)[:, None, None])[:, 0, 0]
     coupling = loops.design.coupling
     places = {**PLACES, **ELASTIC} if coupling is not None and coupling.play_rad == 0.0 else PLACES
@@ -237,7 +235,7 @@ TIME_CONSTANTS = 14.0  # of the slowest pole
 LONGEST_TICKS = 400_000
 
 
-def settling_ticks_of(closed_loop: Any, hold_ticks: int, where: str, longest: int = LONGEST_TICKS) -> int:
+def settling_ticks_of(closed_loop: Any, hold_ticks: int, where: str) -> int:
     """Ticks after which the slowest pole of a sampled closed loop is forgotten."""
     size = np.abs(closed_loop.poles())
     if (size > 1.0 + 1e-9).any():
@@ -245,7 +243,7 @@ def settling_ticks_of(closed_loop: Any, hold_ticks: int, where: str, longest: in
     slowest = size[size < 1.0 - 1e-9].max(initial=0.0)
     if slowest <= 0.0:
         return 20 * hold_ticks
-    return int(min(math.ceil(TIME_CONSTANTS / -math.log(slowest) + 20.0) * hold_ticks, longest))
+    return int(min(math.ceil(TIME_CONSTANTS / -math.log(slowest) + 20.0) * hold_ticks, LONGEST_TICKS))
 
 
 def full_range(design: Design) -> dict[str, float]:

@@ -269,8 +269,7 @@ def ledger(comparison: Comparison) -> list[doc.Section]:
 
 
 def _ledger_cell(one: Compared, wanted: Check) -> doc.Cell:
-    key = (wanted.loop, wanted.name, wanted.condition)
-    entry = next((each for each in one.checks if (each.loop, each.name, each.condition) == key), None)
+    entry = next((each for each in one.checks if each.key == wanted.key), None)
     if entry is None:
         return None
     status = entry.verdict.role()
