@@ -15,7 +15,7 @@ from actuator_lti.drive.profile import command_mean
 from actuator_lti.drive.steady import steady_input
 from actuator_lti.errors import InputError, NumericalError
 from actuator_lti.loops import Loops
-from actuator_lti.loops.tick import compose, mean_response
+from actuator_lti.loops.tick import mean_response
 from actuator_lti.systems.resolvent import states_at
 from analyses.large_signal.classify import FULL_TRIANGLE, STEADY
 from analyses.linear.responses import response_at
@@ -75,9 +75,11 @@ def linear_steady_state(loops: Loops, omega_rad_s: np.ndarray) -> LinearSteadySt
     Ts, M = loops.design.controller.period_s, system.ticks
     angle = [system.outputs.index("output_angle")]
     steps = [(A, B[:, :1], C[angle], D[angle, :1]) for A, B, C, D in map(system.matrices, range(M))]
-    A, B = compose([system.program.tick(k) for k in range(M)])
+    A, B = np.eye(len(system.states)), np.zeros(len(system.states))
+    for A_j, B_j, _, _ in steps:
+        A, B = A_j @ A, A_j @ B + B_j[:, 0]
     z = np.exp(1j * omega_rad_s * M * Ts)
-    x = states_at(A, B[:, :1], z)[..., 0]
+    x = states_at(A, B[:, None], z)[..., 0]
     output = mean_response(steps, np.exp(1j * omega_rad_s * Ts)[:, None, None])[:, 0, 0]
     coupling = loops.design.coupling
     places = {**PLACES, **ELASTIC} if coupling is not None and coupling.play_rad == 0.0 else PLACES
