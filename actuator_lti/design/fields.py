@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import MISSING, dataclass, fields, replace
+from functools import cache
 from typing import Any, Literal, get_args
 
 from actuator_lti.asked.quantities import LOOPS
@@ -101,6 +102,7 @@ TABLES: tuple[Section, ...] = (*SECTIONS, *RECORDS)
 BY_PATH: dict[str, Section] = {section.path: section for section in SECTIONS}
 
 
+@cache
 def children(path: str) -> tuple[Section, ...]:
     return tuple(section for section in SECTIONS if section.parent == path)
 
