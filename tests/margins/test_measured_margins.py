@@ -239,26 +239,6 @@ def test_unusable_noise(call: Callable[..., MeasuredResponse], message: str) -> 
     refused(call, control.frd([1.0, 0.5], [1.0, 2.0]), match=message)
 
 
-def test_noise_widens_every_range() -> None:
-    exact = stability_margins(A1)
-    data = control.frd(A1, np.geomspace(0.2, 8, 300))
-    ranges = []
-    for sigma in (0.0, 0.01, 0.02):
-        m = stability_margins(MeasuredResponse.with_noise(data, sigma) if sigma else data)
-        assert m.modulus_range[0] <= exact.modulus_margin <= m.modulus_range[1]
-        assert m.disk_margin.alpha_range[0] <= exact.disk_margin.alpha <= m.disk_margin.alpha_range[1]
-        assert f"in [{m.modulus_range[0]:.4g}, {m.modulus_range[1]:.4g}]" in str(m)
-        (phase,) = m.phase_margins
-        ranges.append((m.modulus_range, phase.deg_range))
-    (none, of_none), (one, of_one), (two, of_two) = ([high - low for low, high in both] for both in ranges)
-    assert none < 0.01
-    assert one > 0.02
-    assert two > 1.7 * one
-    assert of_none < 0.1 * of_one
-    # of a curve that bends, known at n points: as noise^(4/5) n^(-2/5) (Stone 1982); each point alone: 2
-    assert of_two == pytest.approx(2**0.8 * of_one, rel=0.1)
-
-
 def test_crossings_that_a_coarse_measurement_tells_apart_are_listed_apart() -> None:
     """Twelve points of a two-mass drive: the gain passes one three times, surely, between known points."""
 
@@ -371,8 +351,10 @@ def test_a_hidden_bend_is_not_averaged_away() -> None:
     L = lagging(WC, LAG, DELAY)(omega) * dip
     data = control.frd(L * (1.0 + 0.01 * circular(rng, omega.shape)), omega)
     for given in (data, MeasuredResponse.with_noise(data, 0.01 * np.abs(L))):
-        low, high = stability_margins(given).modulus_range
+        m = stability_margins(given)
+        low, high = m.modulus_range
         assert low <= np.abs(1.0 + L).min() <= high
+        assert f"in [{low:.4g}, {high:.4g}]" in str(m)
 
 
 def test_doubtful_crossings_are_counted_in_one_line() -> None:
