@@ -19,7 +19,6 @@ from analyses.failures.cases import jammed
 from analyses.motion.settling import pole_sizes
 from analyses.specification.requirements import RequirementVerdict, judged_by, tally
 from nonlinear import commands, simulate
-from nonlinear._kernels import layout as at
 from nonlinear.runs.running import Piece
 from nonlinear.runs.setup import check_frequency
 from nonlinear.runs.trajectory import ADVICE
@@ -163,13 +162,11 @@ def duty(design: AnyDesign, asked: Asked | None = None) -> Duty:
     power = R * current**2 + shaft
     peak = max(float(np.abs(part).max()) for part in (current, still))
     rms = float(np.sqrt(asked.share * moving**2 + (1.0 - asked.share) * held**2))
-    limits = zip(at.LIMITERS, at.LIMITER_BITS, strict=True)
-    acts = [name for name, bit in limits if (piece.flags & bit).any()]
     return Duty(
         design, asked, rms, moving, held, peak,
-        design.limits.continuous_current_A, tuple(acts),
+        design.limits.continuous_current_A, piece.limited,
         asked.share * mean(shaft), float(power.max()), max(0.0, -float(power.min())),
-        design.controller.period_s * np.arange(ticks), current, steady,
+        design.controller.period_s * np.arange(ticks, dtype=float), current, steady,
         _overload(design, asked, current, held), heating(design, rms),
     )  # fmt: skip
 
@@ -198,8 +195,7 @@ def _moving(design: Design, asked: Asked) -> tuple[Piece, int, bool]:
     wait = max(PERIODS * ticks, ceil(log(STEADY) / log(slowest)) if slowest > 0.0 else 0)
     while True:
         while gone < min(wait, MOST_WAITED):
-            drive.s[at.S_TICK], gone = 0.0, gone + taken
-            piece = drive.advance(taken)
+            piece, gone = drive.advance(taken), gone + taken
             if piece.status != "ok":
                 raise NumericalError(f"duty ({piece.status}): {ADVICE[piece.status]}")
         rms = float(np.sqrt(np.mean(piece.signal("current_A") ** 2)))
