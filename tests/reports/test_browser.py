@@ -79,6 +79,10 @@ def test_a_link_opens_the_fold_that_it_leads_into(opens, built: Built) -> None:
 
 
 def printed(page: Page) -> list[pypdf.PageObject]:
+    """Its sheets; figures have their room, but none of the curves that are long to read."""
+    page.evaluate(
+        "document.querySelectorAll('figure svg').forEach(({ style }) => style.visibility = 'hidden')"
+    )
     return list(pypdf.PdfReader(io.BytesIO(page.pdf(prefer_css_page_size=True))).pages)
 
 
