@@ -57,7 +57,7 @@ def test_margins_in_json_and_nothing_else(cli) -> None:
     assert ran.data["loops"]["velocity"]["phase_margin_deg"] == pytest.approx(73.70, abs=0.01)
 
 
-@pytest.mark.parametrize("form", ["sampled", "continuous", "ideal"])
+@pytest.mark.parametrize("form", ["continuous", "ideal"])
 def test_margins_on_the_terminal_name_every_loop(form: str, cli) -> None:
     words = cli.text("margins", "ilr33-amber", "--form", form)
     for name in ("Current loop", "Velocity loop", "Position loop", "Phase margin, deg", "✓ met"):

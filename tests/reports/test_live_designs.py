@@ -75,6 +75,7 @@ def test_figures_are_those_of_margins_on_the_saved_file(name: str, opens, tmp_pa
     page, filtered = opens(DESIGNS[name]), DESIGNS[name].command.filter_time_s > 0.0
     assert page.evaluate("document.documentElement.scrollHeight") <= 6 * 900  # six screens open
     assert page.locator("figure.scroll.figure").evaluate_all("all => all.map(f => f.dataset.chart)") == CHARTS
+    assert page.locator("[id^=missing]").count() == 0
     if name in shipped_designs():
         answered_within_two_clicks(page)
     told = command_line(page.saved(tmp_path / "same.toml"))

@@ -142,11 +142,9 @@ def reported(folder: Path, cli: Command, *words: str) -> tuple[Ran, Any]:
     return cli(*call), json.loads((folder / "report.json").read_text())
 
 
-@pytest.mark.parametrize(
-    ("slope", "status", "word"), [("-1", 0, "PASS"), ("1", 0, "PASS"), ("1e9", 1, "FAIL")]
-)
+@pytest.mark.parametrize(("slope", "status", "word"), [("1", 0, "PASS"), ("1e9", 1, "FAIL")])
 def test_the_report_of_a_drive_under_a_slope(slope: str, status: int, word: str, tmp_path, cli) -> None:
-    """Held by the load, pushed by it, driven away by it."""
+    """Pushed by the load, driven away by it."""
     changes = ("--set", "load.path=back-drivable", "--set", f"load.moment_slope={slope} N*m/rad")
     ran, document = reported(tmp_path, cli, "ilr33-amber", *changes)
     assert (ran.status, document["verdict"]["passed"]) == (status, status == 0)
