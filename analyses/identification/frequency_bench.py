@@ -109,7 +109,7 @@ def identify_frequency(
     if play is not None:
         dry = (design.load.friction or LoadFriction()).dry_torque_Nm
         told = f"the play is that at the design's load.friction.dry_torque, {dry:g} N m; more adds to it"
-        items.append(Item(id="kept-load_dry", label="Dry friction of the load", passed=None, reason=told))
+        items.append(Item.unproven("kept-load_dry", "Dry friction of the load", told))
     items.append(_written_item(read_design_text(write_design(made)), lines, record.name, fit.reaction))
     return FrequencyResult(
         record=record,

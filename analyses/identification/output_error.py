@@ -182,7 +182,7 @@ def refine_records(
     wanted = np.concatenate([measured[name] / size for _, name, measured, size in seen])
 
     def output(tried: Design) -> Floats:
-        parts = [model_signals(tried, one, measured)[0][name] / size for one, name, measured, size in seen]
+        parts = [model_signals(tried, one, measured)[name] / size for one, name, measured, size in seen]
         return np.concatenate(parts)
 
     found, (size, _) = fit_output(design, paths, output, wanted, progress), box_of(design, paths)

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from actuator_lti.types import Floats
-from analyses.estimation.means import correlated_means
+from analyses.estimation.series import correlated_means
 from analyses.records.campaign_import import ImportedRun
 from analyses.records.steady_window import SteadyWindow, find_steady_window
 

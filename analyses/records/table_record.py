@@ -3,7 +3,6 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from types import MappingProxyType
 
 import numpy as np
 
@@ -121,10 +120,8 @@ class SiRows:
             told = f"time {time[k]:.15g} s does not come after {reached[k]:.15g} s"
             if time[k] == reached[k]:
                 told += ": a row twice, or stamps of too few digits (then give time.period, not a column)"
-            told += (
-                '; allowed: rising times: a file for each run; or disorder = "drop" in a record file, which '
-            )
-            told += "leaves out this row and all that follow up to the time that was reached"
+            told += '; allowed: rising times: a file for each run; or disorder = "drop" in a record file, '
+            told += "which leaves out this row and all that follow up to the time that was reached"
             raise InputError(told, where=f"{self._origin}:{block.lines[k]}")
         return keep
 
@@ -170,8 +167,8 @@ def record_of_rows(
     return Record(
         name=shown_path(path.name),
         time_s=time,
-        signals=MappingProxyType(signals),
-        units=MappingProxyType({signal.name: to_si(signal)[1] for signal in spec.signals}),
+        signals=signals,
+        units={signal.name: to_si(signal)[1] for signal in spec.signals},
         counts=counts,
         averaged=averaged,
         sha256=digest,
