@@ -292,7 +292,6 @@ def multisine(
 
 
 def _summed(frequency_hz: Floats, phases: Floats, t: Floats) -> Floats:
-    """Sum of sines at times."""
     total = np.zeros(t.size)
     for frequency, phase in zip(frequency_hz, phases, strict=True):
         total += np.sin(2.0 * pi * frequency * t + phase)

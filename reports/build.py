@@ -177,7 +177,7 @@ def validation_sections(design: Design, progress: Progress = None) -> list[doc.S
 def loop_sections(survey: LoopSurvey, verdicts: Sequence[RequirementVerdict]) -> list[doc.Section]:
     design, figures, onset = survey.design, survey.figures, survey.onset
     makers: dict[str, Callable[[], doc.Section]] = {
-        "Requirements": lambda: requirements.section(verdicts, design.load_unit),
+        "Requirements": lambda: requirements.section(verdicts),
         "Margins": lambda: margins.of_loops(figures, survey.operating_points),
     }
     for name, result in figures.items():

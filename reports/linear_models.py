@@ -63,11 +63,10 @@ def linear_models(design: Design) -> Tree:
 def _form(loops: Loops) -> Tree:
     design = loops.design
     length, force = ("m", "N") if design.axis == "linear" else ("rad", "N*m")
-    answer = {"position": length, "velocity": f"{length}/s", "current": "A"}
     responses: Tree = {}
     if loops.plain_response is not None:
-        unit = answer.get(design.controller.outermost, f"{length}/s")
-        responses["command"] = _system(loops.plain_response, stage_words(design)[1], unit)
+        _, unit = stage_words(design)
+        responses["command"] = _system(loops.plain_response, unit, f"{length}/s" if unit == "V" else unit)
     if loops.moment_system is not None:
         responses["load"] = _system(loops.moment_system(), force, length)
     return {

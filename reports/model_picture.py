@@ -77,8 +77,8 @@ def train_boxes(design: Design) -> list[Box]:
     if design.coupling is not None:
         after = design.coupling.after or (design.gears[-1].name if design.gears else None)
         place = next((n for n, box in enumerate(boxes) if box[0] == after), len(boxes) - 1) + 1
-        play = design.coupling.play_rad
-        boxes.insert(place, ("coupling", f"play {1e3 * play:.3g} mrad" if play else "elastic"))
+        play, unit = design.coupling.play_rad, "mm" if design.axis == "linear" else "mrad"
+        boxes.insert(place, ("coupling", f"play {1e3 * play:.3g} {unit}" if play else "elastic"))
     boxes.append(("load", f"{design.load.inertia_kgm2:.3g} kg{' m2' if design.axis == 'rotary' else ''}"))
     return boxes
 

@@ -5,6 +5,8 @@ import re
 from collections.abc import Callable, Iterable
 from typing import Any
 
+from actuator_lti.asked.quantities import unit_words
+
 MISSING = "–"
 LONG_S = 1.0  # a time from which on it is no longer told in ms
 _SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
@@ -87,14 +89,15 @@ def time_unit(span_s: float) -> tuple[float, str]:
     return (1e3, "ms") if span_s >= 1e-3 else (1e6, "µs")
 
 
-def row_time_unit(values_s: Iterable[float | None]) -> tuple[float, str]:
-    """Choose the unit of a row of times, with the factor from seconds: ms, or s where one of them is long.
+def row_unit(unit: str, values: Iterable[float | None]) -> tuple[float, str]:
+    """The unit in which a row is shown, with the factor to it: of times ms, or s where one of them is long.
 
-    >>> row_time_unit([0.023, None]), row_time_unit([0.023, 23.0])
-    ((1000.0, 'ms'), (1.0, 's'))
+    >>> row_unit("s", [0.023, None]), row_unit("s", [0.023, 23.0]), row_unit("N*m", [0.023])
+    ((1000.0, 'ms'), (1.0, 's'), (1.0, 'N m'))
     """
-    known = [abs(value) for value in values_s if value is not None and math.isfinite(value)]
-    return (1.0, "s") if max(known, default=0.0) >= LONG_S else (1e3, "ms")
+    known = [abs(value) for value in values if value is not None and math.isfinite(value)]
+    short_times = unit == "s" and max(known, default=0.0) < LONG_S
+    return (1e3, "ms") if short_times else (1.0, unit_words(unit))
 
 
 def plain_decade(value: float) -> str:

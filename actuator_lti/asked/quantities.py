@@ -15,8 +15,12 @@ if TYPE_CHECKING:
 
 
 def unit_words(unit: str) -> str:
-    """A unit as it is printed: of a ratio none, and N m where a file has N*m."""
-    return "" if unit == "1" else unit.replace("*", " ")
+    """A unit as it is printed: of a ratio none, and N m where a file has N*m.
+
+    >>> unit_words("N*m/rad"), unit_words("deg/s^2"), unit_words("1")
+    ('N m/rad', 'deg/s²', '')
+    """
+    return "" if unit == "1" else unit.replace("*", " ").replace("^2", "²")
 
 
 def shown_unit(unit: str) -> tuple[str, float]:

@@ -13,10 +13,9 @@ from actuator_lti.bandwidth.measured import measured_bandwidth
 from actuator_lti.bandwidth.rational_response import RationalResponse
 from actuator_lti.bandwidth.results import SQUARES, Bandwidth, Level, Peaks
 from actuator_lti.errors import InputError, delay_number
-from actuator_lti.margins.assemble import Place
 from actuator_lti.margins.axis_search import half_turn
 from actuator_lti.margins.delays.form import DelayForm, delay_form, in_series
-from actuator_lti.margins.distances import COMPLEMENTARY, INVERSE, MODULUS
+from actuator_lti.margins.distances import COMPLEMENTARY, INVERSE, MODULUS, Place
 from actuator_lti.margins.exact.crossings import smallest
 from actuator_lti.margins.exact.loop import exact_loop, exact_polynomials
 from actuator_lti.margins.exact.product import late_distances

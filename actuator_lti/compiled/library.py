@@ -85,8 +85,6 @@ _PASSED: dict[Kind, Callable[[Any], Any]] = {
 
 @dataclass(frozen=True)
 class Library:
-    """A library of kernels."""
-
     name: str  # stem of its file
     folder: Path  # of the package; the file lies in ``_native`` there
     entries: tuple[Entry, ...]  # what Python calls

@@ -39,8 +39,6 @@ class Leftover:
 
 @dataclass
 class Residual:
-    """Follows kernels."""
-
     # The number at a place of a row, by the row's argument, which is called alike in every function, or None
     look: Callable[[str, int], float | None]
     # What stands for a call of a kernel, of its arguments and the function that calls it

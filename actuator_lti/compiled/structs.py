@@ -33,8 +33,6 @@ class Member:
 
 @dataclass(frozen=True)
 class Struct:
-    """A structure in place of a row."""
-
     type: str  # names in C, of it and of the pointer to it
     argument: str
     members: tuple[Member, ...]

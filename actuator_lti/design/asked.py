@@ -169,6 +169,11 @@ class Tolerance:
     def relative(self) -> bool:
         return self.text.strip().endswith("%")
 
+    @property
+    def width(self) -> float:
+        """The half width of a uniform one, else the standard deviation."""
+        return (self.half_width if self.kind == "uniform" else self.std) or 0.0
+
 
 @dataclass(frozen=True, kw_only=True)
 class Parameter:

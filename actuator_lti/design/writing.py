@@ -130,8 +130,7 @@ def _entry(known: Parameter, unit: str) -> Any:
 
 
 def _tolerance(tolerance: Tolerance, unit: str) -> Any:
-    width = tolerance.half_width if tolerance.kind == "uniform" else tolerance.std
-    text = _written(tolerance.text) if tolerance.text else _bare(width, unit)
+    text = _written(tolerance.text) if tolerance.text else _bare(tolerance.width, unit)
     if tolerance.kind == "uniform":
         return text
     bounds = {key: getattr(tolerance, key) for key in ("lower", "upper") if isfinite(getattr(tolerance, key))}

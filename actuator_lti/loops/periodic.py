@@ -159,7 +159,6 @@ class PeriodicLoop:
 
 
 def _wired(loops: Loops) -> Drive:
-    """The drive that sampled loops are of."""
     ticks = loops.tick_system
     return wire(loops.design, loops.operating) if ticks is None else ticks.program.drive
 
@@ -274,7 +273,6 @@ def exact_margins(loops: Loops, point: str, longest_delay_ticks: float = 50.0) -
 
 
 def _margins_of(wired: Drive, point: str, longest_delay_ticks: float) -> ExactMargins:
-    """The same of a wired drive."""
     moved, others = (_moved(part, wired.tick_s) for part in _parts(point_blocks(wired, point)))
     radius = float(max(moved.radius(), others.radius()))
     nan = float("nan")
@@ -313,7 +311,6 @@ def _states(systems: Sequence[System]) -> int:
 
 
 def _queued(systems: Sequence[System], updates: int) -> Sequence[System]:
-    """With what enters delayed by whole updates."""
     n, queued = _states(systems), []
     for A, B, C in systems if updates else ():
         over = np.eye(n + updates, k=-1)  # what enters is the first of the queue

@@ -219,6 +219,6 @@ class Loops:
         return draw("loops_html", self)
 
     def __repr__(self) -> str:
-        names = ", ".join(self.present)
-        where = f"{self.operating_point}, {self.load_Nm:g} N m, rotor {self.operating.rotor}"
+        names, load = ", ".join(self.present), f"{self.load_Nm:g} {self.design.load_unit}"
+        where = f"{self.operating_point}, {load}, rotor {self.operating.rotor}"
         return f"Loops({self.design.name}: {names}; {self.form}, {where})"

@@ -205,7 +205,6 @@ class Block:
     states: tuple[str, ...]
 
     def of(self, k: int) -> Block:
-        """That of one of the stacked designs."""
         A, B, C, D = (part[k] if part.ndim > 2 else part for part in (self.A, self.B, self.C, self.D))
         return replace(self, A=A, B=B, C=C, D=D)
 

@@ -48,7 +48,6 @@ class Program:
 
     @property
     def measures_speed(self) -> bool:
-        """Whether the velocity feedback is there."""
         return "velocity" in self.stages and "velocity" not in self.opened
 
     @property

@@ -11,8 +11,8 @@ import numpy as np
 from actuator_lti.axis._search import FAR_LOG
 from actuator_lti.margins.assemble import Crossing, Figures, assembled
 from actuator_lti.margins.axis_parts import axis_parts
-from actuator_lti.margins.axis_search import Factored, Place
-from actuator_lti.margins.distances import DISK, MODULUS, Distance
+from actuator_lti.margins.axis_search import Factored
+from actuator_lti.margins.distances import DISK, MODULUS, Distance, Place
 from actuator_lti.margins.factored import SAME, polished
 from actuator_lti.margins.loop import RationalLoop
 from actuator_lti.margins.results import StabilityMargins

@@ -5,12 +5,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
+from actuator_lti.margins.distances import Place
 from actuator_lti.margins.given import unwarped
 from actuator_lti.margins.results import Evidence, StabilityMargins, Verdict
 from actuator_lti.margins.single import Agreement, DelayMargin, DiskMargin, GainMargin, PhaseMargin
 
 FARTHEST = 1e10  # 200 dB
-Place = tuple[float, float]  # a smallest distance, and its w
 
 
 @dataclass(frozen=True)
@@ -81,7 +81,6 @@ def _phase_margin(c: Crossing, period_s: float | None) -> PhaseMargin:
 
 
 def _far_note(far: int) -> tuple[str, ...]:
-    """What is said of crossings that are not listed."""
     if not far:
         return ()
     crossings = "1 crossing" if far == 1 else f"{far} crossings"
@@ -106,7 +105,6 @@ def delay_margins(phase_margins: tuple[PhaseMargin, ...], period_s: float | None
 
 
 def _within(margins: StabilityMargins, low: float, high: float) -> StabilityMargins:
-    """The same with only the margins of a band listed."""
     lists: dict[str, Any] = {
         name: tuple(one for one in getattr(margins, name) if low <= one.frequency_rad_s <= high)
         for name in ("gain_margins", "phase_margins", "delay_margins")

@@ -19,14 +19,13 @@ import numpy as np
 from actuator_lti.axis import _nearest, _search
 from actuator_lti.axis._factors import BOUNDS, STEP, slot
 from actuator_lti.axis.library import LIBRARY
-from actuator_lti.margins.distances import Distance
+from actuator_lti.margins.distances import Distance, Place
 from actuator_lti.margins.trust import Doubtful
 from actuator_lti.types import Complex, Mask, Real
 
 _NEAR = 2.0 * STEP
 _NEXT_TO_AXIS = 1e-14  # relative: a root on the axis itself is held this far from it
 _ROOM, _MORE, _MOST = 1 << 11, 8, 1 << 17  # intervals: asked for first, each time more, and no more than that
-Place = tuple[float, float]
 
 
 @dataclass(frozen=True)
@@ -116,7 +115,6 @@ class Factored:
         return np.array((gain, np.arctan2(y, a) @ self._turning - self.delay * w + self.phase))
 
     def log_at(self, w: float) -> tuple[float, float]:
-        """The same at one frequency."""
         parts = np.empty(slot(self.roots.size))
         LIBRARY.functions.evaluated(*self._row, w, parts, 0)
         gain, phase = parts[-5:-3].tolist()

@@ -9,6 +9,8 @@ import numpy as np
 
 from actuator_lti.types import Complex, Real
 
+Place = tuple[float, float]  # a smallest distance, and its w
+
 
 @dataclass(frozen=True)
 class Distance:
@@ -46,7 +48,6 @@ class Distance:
 
     @property
     def at_no_gain(self) -> float:
-        """Where L is zero."""
         return abs(self.b / self.e) if self.e else math.inf
 
     def below(self, value: Any) -> tuple[Any, Any, Any]:

@@ -144,7 +144,6 @@ def _behind_delay(
 
 
 def _inside_delays(form: DelayForm, band: tuple[float, float] | None) -> StabilityMargins:
-    """By certified intervals."""
     from actuator_lti.margins.delays.certified import certified_delayed_margins  # python-flint if needed
     from actuator_lti.margins.delays.exact import exact_inside_delays
 

@@ -42,11 +42,9 @@ class RationalLoop:
 
     @property
     def order(self) -> int:
-        """Number of states."""
         return self.b.size
 
     def behind(self, delay_s: float) -> RationalLoop:
-        """The loop behind a delay in place of its own."""
         delay = delay_s / (self.period_s or 1.0)
         return self if delay == self.delay else replace(self, delay=delay)
 

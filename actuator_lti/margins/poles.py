@@ -17,8 +17,6 @@ _SAFE = 10.0
 
 @dataclass(frozen=True)
 class SortedPoles:
-    """Poles of a system by the stability boundary."""
-
     values: Complex  # (n,): all of them
     unstable: int  # how many lie strictly outside the stable region
     border: int = 0  # how many lie on the border as far as double precision can tell
@@ -28,7 +26,6 @@ class SortedPoles:
 
 
 def eigenvalues(A: Real) -> Complex:
-    """Eigenvalues of a real matrix."""
     if not A.size:
         return np.empty(0, dtype=complex)
     return _eigen(A, vectors=False)[0]

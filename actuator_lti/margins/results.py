@@ -137,7 +137,6 @@ class StabilityMargins:
         return "\n".join(_lines(self))
 
     def _repr_html_(self) -> str:
-        """What a notebook shows."""
         return draw("margins_html", self)
 
 

@@ -5,12 +5,10 @@ from dataclasses import dataclass
 
 
 def frequency_text(omega_rad_s: float) -> str:
-    """A frequency in both units."""
     return f"{omega_rad_s:.6g} rad/s ({omega_rad_s / (2.0 * math.pi):.6g} Hz)"
 
 
 def between_text(low_rad_s: float, high_rad_s: float) -> str:
-    """An interval of frequencies in both units."""
     hertz = f"{low_rad_s / (2.0 * math.pi):.6g} to {high_rad_s / (2.0 * math.pi):.6g} Hz"
     return f"between {low_rad_s:.6g} and {high_rad_s:.6g} rad/s ({hertz})"
 

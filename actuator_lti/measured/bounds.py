@@ -30,7 +30,6 @@ class Strip:
 
     @property
     def range(self) -> tuple[float, float]:
-        """Smallest and largest value anywhere."""
         return float(self.low.min()), float(self.high.max())
 
     def meets(self, level: float) -> tuple[Real, Real]:

@@ -26,7 +26,6 @@ def need(module: str, extra: str, what: str) -> ModuleType:
 
 
 def package_version(name: str = "actuator-lti", otherwise: str = "not installed") -> str:
-    """The version of an installed package."""
     from importlib.metadata import PackageNotFoundError, version
 
     try:

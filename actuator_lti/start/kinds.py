@@ -44,7 +44,6 @@ class _Names(dict[str, Any]):
 
 @cache
 def _kinds(made: Callable[..., Any]) -> dict[str, Kind]:
-    """What each argument may be."""
     asked = {name: hint for name, hint in made.__annotations__.items() if name != "return"}
     held = SimpleNamespace(__annotations__=asked)
     hints = get_type_hints(held, localns=_Names(made.__globals__), include_extras=True)

@@ -15,6 +15,7 @@ from actuator_lti.margins.delays.axis import IMAGINARY, REAL, Axis, Form, smalle
 from actuator_lti.margins.delays.exact import HIGHEST_ORDER, ExactDelayLoop, Quasi, exact_inside_delays
 from actuator_lti.margins.delays.form import DelayForm, delay_form, without_series_delays
 from actuator_lti.margins.distances import Distance
+from actuator_lti.systems.exact_response import double
 from actuator_lti.systems.plain_system import PlainSystem
 from actuator_lti.types import Real
 
@@ -40,7 +41,6 @@ class DelayResponse:
 
     @classmethod
     def of(cls, form: DelayForm) -> DelayResponse:
-        """Its delay in series counts."""
         loop, *others = exact_inside_delays(form, reduced=False)
         N, D = _told(loop.N, [other.N for other in others]), _told(loop.D, [other.D for other in others])
         return cls(replace(loop, N=N, D=D))
@@ -69,8 +69,7 @@ class DelayResponse:
     @property
     def lead(self) -> float:
         """L s^order at s = 0: the value at zero frequency where ``order`` is 0."""
-        ratio = self.loop.at_rest[0][self._orders[0]] / self.loop.at_rest[1][self._orders[1]]
-        return float(ratio.p) / float(ratio.q)
+        return double(self.loop.at_rest[0][self._orders[0]] / self.loop.at_rest[1][self._orders[1]])
 
     def crossings(self, level: float, top: float | None = None) -> list[float]:
         """Where the gain passes a level, rad/s, in order, up to ``top`` or to where it stays below."""

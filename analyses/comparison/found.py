@@ -41,8 +41,6 @@ Figures = Mapping[str, float | None]
 
 @dataclass(frozen=True)
 class FigureName:
-    """A figure."""
-
     key: str
     label: str
     unit: str
@@ -144,9 +142,6 @@ def _name(whole: str, design: Design) -> FigureName:
     return FigureName(whole, words, "" if unit == "1" else unit, group, better)
 
 
-LIBRARIES = ("numpy", "scipy")
-
-
 @dataclass(frozen=True)
 class Changed:
     """One key that differs from the base, as texts."""
@@ -179,6 +174,9 @@ class Found:
     untested: str = ""  # why the validator could not test this design
 
 
+_FOUND = TypeAdapter(Found)
+
+
 @dataclass(frozen=True)
 class Kept:
     """What is found of the designs of a study, in one folder; nothing without one."""
@@ -194,14 +192,14 @@ class Kept:
             return None
         try:
             head, _, body = decode(read_bytes(path, "entry"), str(path)).partition("\n")
-            return _adapter().validate_python(json.loads(body)) if head == _digest(body) else None
+            return _FOUND.validate_python(json.loads(body)) if head == _digest(body) else None
         except (InputError, ValueError, RecursionError):  # or not what this version writes
             return None
 
     def write(self, design: Design, found: Found) -> Found:
         """Keep what was found, and give it back."""
         if (path := self._path(design)) is not None:
-            body = json.dumps(_adapter().dump_python(found))
+            body = json.dumps(_FOUND.dump_python(found))
             write_bytes(path, f"{_digest(body)}\n{body}".encode())
         return found
 
@@ -214,14 +212,8 @@ class Kept:
 
 
 @cache
-def _adapter() -> TypeAdapter[Found]:
-    """Turns what is found into plain data and back."""
-    return TypeAdapter(Found)
-
-
-@cache
 def _code() -> list[str]:
-    return [code_version(), *(f"{name} {metadata.version(name)}" for name in LIBRARIES)]
+    return [code_version(), *(f"{name} {metadata.version(name)}" for name in ("numpy", "scipy"))]
 
 
 def _digest(text: str) -> str:

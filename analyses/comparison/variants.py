@@ -48,8 +48,6 @@ class Compared(Found):
 
 @dataclass(frozen=True)
 class Comparison:
-    """A study compared."""
-
     study: Study
     names: tuple[FigureName, ...]
     base: Compared
@@ -65,12 +63,10 @@ class Comparison:
 
     @property
     def all(self) -> tuple[Compared, ...]:
-        """Base first."""
         return (self.base, *self.variants)
 
     @property
     def tally(self) -> Tally:
-        """The requirements of all designs, counted."""
         return sum((tally(one.verdicts) for one in self.everything.all), Tally())
 
     @property

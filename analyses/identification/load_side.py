@@ -4,9 +4,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
-from scipy.signal import lsim
+from scipy.linalg import schur
+from scipy.signal import lfilter
 
 from actuator_lti.design.model import Coupling, Design, LoadFriction
+from actuator_lti.systems.sampling import held_step
 from actuator_lti.types import Floats
 from analyses.identification.joint_model import Recipe
 from analyses.records.differentiation import Motion
@@ -86,15 +88,25 @@ def _follows(design: Design, coupling: Coupling, record: Record, motion: Motion,
         return driver
     k, c = coupling.stiffness_Nm_rad, coupling.damping_Nms_rad
     viscous, dry, offset = friction.viscous_Nms_rad, friction.dry_torque_Nm, friction.offset_torque_Nm
-    a = np.array([[0.0, 1.0], [-k / inertia, -(c + viscous) / inertia]])
-    system = (a, np.array([[0.0], [1.0 / inertia]]), np.eye(2), np.zeros((2, 1)))
-    time = record.period_s * np.arange(len(moment))
+    a = np.array([[0.0, 1.0, 0.0], [-k / inertia, -(c + viscous) / inertia, 1.0 / inertia], [0.0, 0.0, 0.0]])
+    step, turned = held_step(a, np.eye(3)[:, 2:] / record.period_s, record.period_s)  # straight between rows
     pull = k * driver.position + c * driver.velocity + moment / design.ratio_behind_coupling - offset
     place, speed = driver.position, driver.velocity
     for _ in range(ROUNDS if dry > 0.0 else 1):
         force = pull - dry * np.sign(speed)
         rest = force[0] - (c + viscous) * speed[0]
-        place, speed = lsim(system, force, time, X0=[rest / k, speed[0]])[1].T
+        driven = np.outer(step[:2, 2], force[:-1]) + np.outer(turned[:2], np.diff(force))
+        place, speed = _recursion(step[:2, :2], np.array([rest / k, speed[0]]), driven)
     rate = (k * (driver.position - place) + c * (driver.velocity - speed) - viscous * speed) / inertia
     rate += (moment / design.ratio_behind_coupling - offset - dry * np.sign(speed)) / inertia
     return Motion(position=place, velocity=speed, acceleration=rate)
+
+
+def _recursion(A: Floats, start: Floats, driven: Floats) -> Floats:
+    """``x_(k+1) = A x_k + driven_k``, shape (states, rows): along the triangular form, state by state."""
+    R, U = schur(A, output="complex")
+    z = U.conj().T @ np.column_stack((start, driven))
+    for j in reversed(range(len(R))):
+        z[j, 1:] += R[j, j + 1 :] @ z[j + 1 :, :-1]
+        z[j] = lfilter([1.0], [1.0, -R[j, j]], z[j])
+    return np.asarray((U @ z).real)

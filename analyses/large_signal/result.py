@@ -47,7 +47,6 @@ class LimitShift:
 
     @property
     def ratio(self) -> np.ndarray:
-        """Simulated over linear."""
         return np.asarray(self.simulated_rad / self.linear_rad)
 
 

@@ -115,7 +115,7 @@ def sawtooth(
     runs = list[SawtoothRun]()
     for load in design.validation.loads_Nm:
         if (run := _run(design, amplitude, chosen, load, rate)) is None:
-            reason = f"at a load of {load:g} N m the output stands still"
+            reason = f"at a load of {load:g} {design.load_unit} the output stands still"
             return Sawtooth(amplitude, chosen.frequency_hz, rate, reason=reason)
         runs.append(run)
     push = min(result.acceleration_rad_s2 for result in figures)

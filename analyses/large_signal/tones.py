@@ -237,7 +237,7 @@ TIME_CONSTANTS = 14.0  # of the slowest pole
 LONGEST_TICKS = 400_000
 
 
-def settling_ticks_of(closed_loop: Any, hold_ticks: int, where: str, longest: int = LONGEST_TICKS) -> int:
+def settling_ticks_of(closed_loop: Any, hold_ticks: int, where: str) -> int:
     """Ticks after which the slowest pole of a sampled closed loop is forgotten."""
     size = np.abs(closed_loop.poles())
     if (size > 1.0 + 1e-9).any():
@@ -245,7 +245,7 @@ def settling_ticks_of(closed_loop: Any, hold_ticks: int, where: str, longest: in
     slowest = size[size < 1.0 - 1e-9].max(initial=0.0)
     if slowest <= 0.0:
         return 20 * hold_ticks
-    return int(min(math.ceil(TIME_CONSTANTS / -math.log(slowest) + 20.0) * hold_ticks, longest))
+    return int(min(math.ceil(TIME_CONSTANTS / -math.log(slowest) + 20.0) * hold_ticks, LONGEST_TICKS))
 
 
 def full_range(design: Design) -> dict[str, float]:

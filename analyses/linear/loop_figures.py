@@ -254,7 +254,6 @@ def _with_hold_told(loops: Loops, figures: LoopFigures) -> LoopFigures:
 
 
 def _differing(margins: StabilityMargins, other: StabilityMargins) -> str:
-    """What matters of other margins."""
     if other.stable is not margins.stable:
         return "stable" if other.stable else "not stable"
     if not other.stable:

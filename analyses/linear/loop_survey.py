@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING, Any
@@ -129,20 +129,18 @@ def survey_loops(design: AnyDesign, progress: Progress = None) -> LoopSurvey:
     for form in () if design.controller.sampled_only else FORMS[1:]:
         other = attempt(f"{form} form", partial(_other_form, design, form, refused), None)
         forms |= {} if other is None else {form: other}
-    cuts, parts = loops.break_points, list[Any]()
-    asked: tuple[tuple[str, Callable[[], Any], Any], ...] = (
-        ("loops at the break points", lambda: {name: _break_point(loops, name) for name in cuts}, {}),
-        ("loops at the operating points", lambda: operating_points(design, refused), ()),
-        ("delay budgets", lambda: _budgets(design, sampled), {}),
-        ("limit of linear validity", lambda: _onset(loops, sampled), None),
+    tell(2, 6)
+    cuts = attempt(
+        "loops at the break points", lambda: {n: _break_point(loops, n) for n in loops.break_points}, {}
     )
-    for done, (what, part, without) in enumerate(asked, 2):
-        tell(done, 6)
-        parts.append(attempt(what, part, without))
+    tell(3, 6)
+    points = attempt("loops at the operating points", lambda: operating_points(design, refused), ())
+    tell(4, 6)
+    budgets = attempt("delay budgets", lambda: _budgets(design, sampled), {})
+    tell(5, 6)
+    border = attempt("limit of linear validity", lambda: _onset(loops, sampled), None)
     tell(6, 6)
-    break_points, points, budgets, border = parts
-    why = tuple(dict.fromkeys(refused))
-    return LoopSurvey(design, loops, forms, break_points, points, budgets, border, why)
+    return LoopSurvey(design, loops, forms, cuts, points, budgets, border, tuple(dict.fromkeys(refused)))
 
 
 def _other_form(design: Design, form: Form, refused: list[str]) -> Mapping[str, LoopFigures]:

@@ -19,6 +19,8 @@ from typing import Any
 import control
 import numpy as np
 
+from actuator_lti.drive.signals import SIGNALS
+from actuator_lti.drive.wiring import COMMANDS
 from actuator_lti.errors import InputError
 from actuator_lti.files.reading import read_json, shown_path
 from actuator_lti.loops.result import Loop, Loops
@@ -68,9 +70,7 @@ def loop_around(loops: Loops, outer: OuterLoop) -> Loop:
         one = control.ss([], [], [], [[1.0]], around.dt)
     else:
         one = type(around).from_system(control.ss([], [], [], [[1.0]]))
-    angle = "m" if loops.design.axis == "linear" else "rad"
-    units = {"position": angle, "velocity": f"{angle}/s", "current": "A"}
-    unit = units.get(loops.design.controller.outermost, "V")
+    unit = SIGNALS[COMMANDS[loops.design.controller.outermost]].unit_for(loops.design.axis)
     closed, sensitivity = around.feedback(1), one.feedback(around)
     return Loop(outer.name, "command", around, closed, sensitivity, period, unit_in=unit, unit_out=unit)
 
@@ -95,11 +95,9 @@ def held(system: control.StateSpace, times: int) -> control.StateSpace:
     """A sampled system at every ``times``-th instant, its input held in between."""
     if times == 1:
         return system
-    A, B = np.asarray(system.A), np.asarray(system.B)
-    power, total = np.eye(A.shape[0]), np.zeros_like(B)
-    for _ in range(times):
-        total, power = A @ total + B, A @ power
-    return control.ss(power, total, system.C, system.D, times * system.dt)
+    n = len(system.A)
+    whole = np.linalg.matrix_power(np.block([[system.A, system.B], [np.zeros((1, n)), np.eye(1)]]), times)
+    return control.ss(whole[:n, :n], whole[:n, n:], system.C, system.D, times * system.dt)
 
 
 COEFFICIENTS, MATRICES = ("num", "den"), ("A", "B", "C", "D")

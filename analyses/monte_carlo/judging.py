@@ -122,16 +122,6 @@ def judge(requirement: Requirement, design: Design, columns: Columns) -> Judged:
     return Judged(values[worst, places], distance, distance >= 0.0)
 
 
-def label(requirement: Requirement, load_unit: str) -> str:
-    """A requirement in words: quantity, loop, load."""
-    words = [requirement.quantity.replace("_", " ")]
-    if requirement.loop:
-        words.append(f"{requirement.loop} loop")
-    if requirement.load_Nm is not None:
-        words.append(f"at {requirement.load_Nm:g} {load_unit}")
-    return ", ".join(words)
-
-
 WORST_KEPT = 8
 BLOCK = 4096  # samples that are in memory at once
 

@@ -31,7 +31,7 @@ from analyses.monte_carlo.judging import BLOCK, Reduction, Tally
 from analyses.monte_carlo.task import CHUNK, SampleTask, StepCheck, Store
 from analyses.monte_carlo.worst import worst_case
 from analyses.slugs import slug
-from analyses.specification.requirements import RequirementVerdict, judged_nominally
+from analyses.specification.requirements import RequirementVerdict, judged_nominally, words_of
 from analyses.studies.engine import Chunk, Engine
 from analyses.studies.sampling import Table, sampler_of
 
@@ -114,7 +114,7 @@ def monte_carlo(
     tallies = list(zip(judging.judged(design), whole.tallies, strict=True))
     odds = [
         _odds(
-            r.id, judging.label(r, design.load_unit), r.unit, tally.passed, whole.count,
+            r.id, words_of(r, r.loop, design.load_unit), r.unit, tally.passed, whole.count,
             minimum=r.minimum, maximum=r.maximum,
             nominal=float(judging.judge(r, design, nominal).value[0]), worst=tally.worst[0][2],
             worst_sample=tally.worst[0][1], columns=judging.source_columns(r, design),

@@ -23,7 +23,7 @@ from actuator_lti.design.tolerances import together
 from actuator_lti.drive.operating import OperatingPoint
 from actuator_lti.errors import InputError, finite_number
 from actuator_lti.files.atomic import write_bytes
-from actuator_lti.files.reading import Tree
+from actuator_lti.files.reading import Tree, read_json
 from actuator_lti.start.border import asked
 from analyses.monte_carlo.judging import drive_column, in_populations, loop_column, loop_columns, loops_of
 from analyses.studies.engine import Arrays, Chunk
@@ -51,10 +51,7 @@ class Store:
         path = folder / "manifest.json"
         wanted = {"schema": SCHEMA, "version": VERSION, "identity": dict(identity)}
         if path.exists():
-            try:
-                result = json.loads(path.read_text(encoding="utf-8"))
-            except (OSError, ValueError) as error:
-                raise InputError(f"cannot be read: {error}", where=str(path)) from error
+            result = read_json(path, "manifest of a study")
             known = isinstance(result, dict) and isinstance(result.get("chunk"), int)
             if not known or result["chunk"] < 1:
                 raise InputError("is no manifest of a study", where=str(path))
@@ -138,11 +135,6 @@ STEP: Mapping[str, tuple[str, Callable[[BatchResult], np.ndarray]]] = {
 """Figures of a nonlinear step against its command: unit, and how they are read; shares are of the time."""
 
 
-def step_units() -> dict[str, str]:
-    """Columns of a nonlinear step with their units."""
-    return {f"nonlinear.{name}": unit for name, (unit, _) in STEP.items()}
-
-
 def step_rows(step: StepCheck, population: Population) -> Rows:
     rows = Rows.of(population.stacked, population.count)
     rows["load"] = step.load_Nm
@@ -154,7 +146,7 @@ def step_rows(step: StepCheck, population: Population) -> Rows:
 
 
 def step_columns(step: StepCheck, population: Population) -> Arrays:
-    """Figures of the nonlinear step of every design, by the columns of `step_units`; NaN of a failed run."""
+    """Figures of the nonlinear step of every design, by column; NaN of a failed run."""
     run = step_rows(step, population).run(threads=1)
     return {f"nonlinear.{name}": np.where(run.ok, read(run), np.nan) for name, (_, read) in STEP.items()}
 
@@ -228,7 +220,8 @@ class SampleTask:
         of = {loop_column(self.design, loop, name): name for loop in loops for name in names}
         of |= {drive_column(name, load): name for name, load in self._drive_wanted}
         units = {column: QUANTITIES[name].unit_for(self.design.axis) for column, name in of.items()}
-        return units | ({} if self.step is None else step_units())
+        stepped = {f"nonlinear.{name}": unit for name, (unit, _) in STEP.items()}
+        return units | (stepped if self.step else {})
 
     def identity(self) -> Tree:
         """Everything that decides the numbers, as plain JSON."""

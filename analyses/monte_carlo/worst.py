@@ -135,12 +135,11 @@ def _score(factor: Factor, value: np.ndarray, group: Group) -> np.ndarray:
     t = factor.tolerance
     if t.kind == "uniform":
         low = ndtr(-group.radius)
-        share = np.clip(0.5 + 0.5 * (value - factor.nominal) / float(t.half_width or 1.0), 0.0, 1.0)
+        share = np.clip(0.5 + 0.5 * (value - factor.nominal) / t.width, 0.0, 1.0)
         return np.asarray(ndtri(low + share * (1.0 - 2.0 * low)))
-    std = float(t.std or 1.0)
-    score = (value - factor.nominal) / std
+    score = (value - factor.nominal) / t.width
     if t.kind == "truncated-normal":
-        low, high = ndtr((t.lower - factor.nominal) / std), ndtr((t.upper - factor.nominal) / std)
+        low, high = ndtr((t.lower - factor.nominal) / t.width), ndtr((t.upper - factor.nominal) / t.width)
         score = ndtri(np.clip((ndtr(score) - low) / (high - low), 1e-300, 1.0 - 1e-16))
     return np.asarray(score)
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from datetime import datetime
+from functools import lru_cache
 from itertools import chain, count
 from typing import Any
 
@@ -76,7 +77,7 @@ class Record:
     first_row: int = field(default=0, repr=False)  # rows of the file that come before the first
     as_read: Record | None = field(default=None, repr=False)  # before it was put on a grid; None: it is that
     # Keys of a design, with values that were other than the design's while this record was taken
-    settings: Mapping[str, Any] = field(default_factory=dict)
+    settings: Mapping[str, str | float] = field(default_factory=dict)
     # How the drive took its command between the rows: SMOOTH, STRAIGHT, HELD; empty: as it meets them best
     between: str = ""
     early_s: Floats | None = field(default=None, repr=False)  # a step of it came before each row; NaN: none
@@ -86,7 +87,7 @@ class Record:
         if not self.settings:
             return design
         try:
-            return design.with_values(self.settings)
+            return _as_set(design, tuple(self.settings.items()))
         except InputError as error:
             raise InputError(f"settings: {error.message}", where=self.name) from None
 
@@ -151,6 +152,12 @@ class Record:
         check_error(error, self.resample_tolerance, note, self.name)
         notes = (*self.notes, note)
         return replace(self, time_s=grid, signals=cut, notes=notes, as_read=self)
+
+
+@lru_cache(maxsize=64)
+def _as_set(design: Design, settings: tuple[tuple[str, str | float], ...]) -> Design:
+    """A fit asks the same thousands of times, and each time the design was read anew."""
+    return design.with_values(dict(settings))
 
 
 def check_error(error: float, tolerance: float, note: str, where: str) -> None:

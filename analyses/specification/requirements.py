@@ -120,8 +120,8 @@ class RequirementVerdict:
     @property
     def figure(self) -> tuple[object, ...]:
         """What is judged: verdicts of two designs stand side by side where it is the same."""
-        of = self.requirement
-        return self.id, of.quantity, self.loop, of.rotor, of.to, of.load_Nm, self.load_unit, of.unit
+        of, load_unit = self.requirement, self.load_unit * bool(self.requirement.load_Nm)
+        return self.id, of.quantity, self.loop, of.rotor, of.to, of.load_Nm, load_unit, of.unit
 
     @property
     def passes(self) -> bool:
@@ -130,6 +130,15 @@ class RequirementVerdict:
     @property
     def role(self) -> Role:
         return self.verdict.role(waived=self.waiver is not None)
+
+
+def words_of(of: Requirement, loop: str | None, load_unit: str, rotor: str = "") -> str:
+    """What a requirement limits of a loop or, at a load, of the drive."""
+    what = QUANTITIES[of.quantity].words
+    if loop is not None:
+        to = f", to the {of.to}" if of.to and loop == "position" else ""
+        return f"{loop.capitalize()} loop{f', rotor {rotor}' * bool(rotor)}: {what}{to}"
+    return f"Drive: {what}" + ("" if of.load_Nm is None else f" at {of.load_Nm:g} {load_unit}")
 
 
 def tally(verdicts: Iterable[RequirementVerdict]) -> Tally:
@@ -160,7 +169,7 @@ def judged(
         loops = judged_loops(requirement.loop, figures)
         verdicts = [_judge_loop(design, requirement, name, figures.get(name)) for name in loops]
     waivers = [design.waiver_of(one.id) if one.verdict == "not proven" else None for one in verdicts]
-    unit = design.load_unit if requirement.load_Nm else ""
+    unit = "" if requirement.load_Nm is None else design.load_unit
     return [replace(one, waiver=w, load_unit=unit) for one, w in zip(verdicts, waivers, strict=True)]
 
 

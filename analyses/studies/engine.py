@@ -15,7 +15,7 @@ import signal
 import warnings
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, CancelledError, ThreadPoolExecutor, wait
-from contextlib import AbstractContextManager, ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
@@ -112,13 +112,6 @@ def local_cluster(workers: int) -> LocalCluster:
         signal.pthread_sigmask(signal.SIG_SETMASK, held)
 
 
-def quiet() -> AbstractContextManager[None]:
-    """What Dask would log of a lost connection is said in one line, by what is raised."""
-    from distributed.utils import silence_logging_cmgr
-
-    return silence_logging_cmgr(logging.CRITICAL + 1)
-
-
 def submit(client: Any, work: Work, todo: list[Any], sink: Sink) -> None:
     """Compute on a Dask cluster, with a few parts a worker under way; a lost worker's parts run again."""
     import distributed
@@ -210,7 +203,6 @@ class Engine:
 
     @property
     def distributed(self) -> bool:
-        """Whether parts go to other processes."""
         return self.workers is not None or self.scheduler is not None
 
     def map(
@@ -260,9 +252,10 @@ class Engine:
     @contextmanager
     def _client(self) -> Iterator[Client]:
         import distributed
+        from distributed.utils import silence_logging_cmgr
 
         with ExitStack() as stack:
-            stack.enter_context(quiet())
+            stack.enter_context(silence_logging_cmgr(logging.CRITICAL + 1))  # what is raised says it
             if self.scheduler is not None:
                 yield stack.enter_context(connected(self.scheduler, self.tls))
             else:

@@ -42,25 +42,18 @@ class Factor:
         """SI values at cumulative probabilities u in (0, 1)."""
         t = self.tolerance
         if t.kind == "uniform":
-            return self.nominal + _width(t.half_width) * (2.0 * u - 1.0)
-        std = _width(t.std)
+            return self.nominal + t.width * (2.0 * u - 1.0)
         if t.kind == "truncated-normal":
-            low = ndtr((t.lower - self.nominal) / std)
-            u = low + u * (ndtr((t.upper - self.nominal) / std) - low)
-        return self.nominal + std * ndtri(u)
+            low = ndtr((t.lower - self.nominal) / t.width)
+            u = low + u * (ndtr((t.upper - self.nominal) / t.width) - low)
+        return self.nominal + t.width * ndtri(u)
 
     @property
     def box(self) -> tuple[float, float]:
         """Smallest and largest value of the tolerance box; +-3 standard deviations of a normal one."""
         t = self.tolerance
-        half_range = _width(t.half_width) if t.kind == "uniform" else BOX_SIGMA * _width(t.std)
+        half_range = t.width if t.kind == "uniform" else BOX_SIGMA * t.width
         return max(self.nominal - half_range, t.lower), min(self.nominal + half_range, t.upper)
-
-
-def _width(value: float | None) -> float:
-    if value is None or not value > 0.0:
-        raise InputError(f"tolerance of width {value}: a positive half width or standard deviation")
-    return value
 
 
 @dataclass(frozen=True)

@@ -97,8 +97,6 @@ LONGEST_NAME = 200
 
 @dataclass(frozen=True)
 class Variant:
-    """One design of a study."""
-
     name: str  # as written, any text, never used as a path
     slug: str  # its form in file names, unique in the study
     design: Design | None  # ``None`` where it was refused
@@ -108,8 +106,6 @@ class Variant:
 
 @dataclass(frozen=True)
 class MonteCarloPlan:
-    """What a study asks of Monte Carlo."""
-
     samples: int = 1000
     seed: int = 0
 
@@ -196,8 +192,6 @@ def _name(table: Table, name: str) -> str:
 
 @dataclass(frozen=True)
 class _Maker:
-    """Makes a study of its file."""
-
     root: Table
     asked: list[Tree]  # the study's own requirements
     lines: Mapping[str, int]  # of its keys

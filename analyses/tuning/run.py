@@ -12,8 +12,7 @@ from actuator_lti.design.fields import FIELDS, Structure, template_of
 from actuator_lti.design.loader import AnyDesign, as_design
 from actuator_lti.design.model import Design, Requirement
 from actuator_lti.types import Floats, Progress
-from analyses.monte_carlo.judging import label
-from analyses.specification.requirements import RequirementVerdict
+from analyses.specification.requirements import RequirementVerdict, words_of
 from analyses.tuning import result
 from analyses.tuning.asked import Aim, TuningSettings
 from analyses.tuning.least import least_change
@@ -151,7 +150,8 @@ def _binding(
         values = problem.values_at(gains[None, :], problem.all_corners[[worst]], problem.factors)
         binds = relative <= smallest + _BINDS and not enough
         at = {factor.path: float(values[factor.path][0]) for factor in problem.factors if worst}
-        about = (requirement.id, label(requirement, problem.design.load_unit), requirement.unit)
+        words = words_of(requirement, requirement.loop, problem.design.load_unit)
+        about = (requirement.id, words, requirement.unit)
         yield result.BindingRequirement(*about, value, limit, distance, relative, binds, at)
 
 

@@ -44,15 +44,15 @@ def _profile(pair: Pair) -> Iterator[Row]:
     columns = ("profile_range", "profile_rate", "profile_acceleration")
     first = 1 if outermost == "position" else 0
     rows = pair.rows(command=replace(own, filter_time_s=0.0))
+    free = rows.copy()
+    for column in columns:
+        free[column] = inf
     for n, key in enumerate(keys[: 3 - first]):
         limit, there = float(getattr(model, key)), float(getattr(own, key))
         if not isfinite(min(limit, there)):
             continue
-        alone = rows.copy()
-        alone["profile_samples"] = 0.0
-        for column in columns:
-            if column != columns[n + first]:
-                alone[column] = inf
+        alone, column = free.copy(), columns[n + first]
+        alone["profile_samples"], alone[column] = 0.0, rows.value(column)
         drive = alone.running().begin(FAR * min(limit, there) * T)
         found = drive.value("PROFILE_SPEED" if n + first else "PROFILE") / (T if n + first == 2 else 1.0)
         unit = f"{angle}/s" + ("", "^2", "^3")[n]
@@ -60,14 +60,12 @@ def _profile(pair: Pair) -> Iterator[Row]:
         yield pair.judged(name, limit, found, unit, "first update of a large command")
     keeps = outermost == "position" and pair.design.controller.position_loop.law is None  # its reference
     if keeps and isfinite(min(model.jerk_rad_s3, own.jerk_rad_s3)):
-        yield _jerk(pair, rows, T)
+        yield _jerk(pair, free, T)
 
 
 def _jerk(pair: Pair, rows: Rows, T: float) -> Row:
     """Samples of the mean: what one update lets through of a command without other limits."""
     model = pair.model.command
-    for column in ("profile_range", "profile_rate", "profile_acceleration"):
-        rows[column] = inf
     drive = rows.running().begin(1.0)
     samples = pair.design.total_ratio / drive.value("REFERENCE")
     wanted = max(ceil(2.0 * model.acceleration_rad_s2 / (model.jerk_rad_s3 * T) - 1e-9), 1)

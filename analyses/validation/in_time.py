@@ -16,6 +16,7 @@ import numpy.typing as npt
 from scipy.linalg import eig
 
 from actuator_lti.errors import NumericalError
+from actuator_lti.loops.commanded import sampled_step
 from actuator_lti.systems.resolvent import balanced
 from actuator_lti.types import Complexes, Floats
 from analyses.validation.places import Bench
@@ -77,10 +78,7 @@ def step_shown(bench: Bench, name: str) -> StepShown | None:
         return None
     setup, closed = bench.setup(name), figures.loop.plain_closed
     samples = int(min(max(SETTLINGS * figures.step.settling_time_s / closed.dt, 20.0), MOST_SAMPLES))
-    x, linear = np.zeros(len(closed.A)), np.empty(samples)
-    for k in range(samples):
-        linear[k] = float(closed.C[0] @ x + closed.D[0, 0])
-        x = closed.A @ x + closed.B[:, 0]
+    linear = np.asarray(sampled_step(closed, samples), dtype=float)
     largest = float(np.max(np.abs(linear)))
 
     def stepped(size: float) -> Floats | None:

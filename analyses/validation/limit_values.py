@@ -3,10 +3,11 @@
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from math import inf, isfinite
-from typing import Any
+from typing import Any, Literal
 
 from actuator_lti.design.model import Command, CurrentLoop, Design, Instruments, Limits
-from actuator_lti.drive.wiring import wire
+from actuator_lti.drive.signals import CLAMP_OF, LIMITERS
+from actuator_lti.drive.wiring import COMMANDS, wire
 from analyses.validation.row import WITHIN, Row, judged
 from analyses.validation.torque_values import edge
 from nonlinear.rows import Rows
@@ -14,17 +15,8 @@ from nonlinear.runs.running import Running
 
 FAR = 1e6  # times a limit: a command that nothing follows
 OVER = 3.0  # times a limit: what an integral is asked beyond it
-Limit = tuple[str, str, str]
-
-
-# where the state holds each signal that a stage drives; its limit and that of its rate: name, attribute, unit
-LIMITED: dict[str, tuple[str, Limit, Limit | None]] = {
-    "u": ("VOLTAGE_BEFORE", ("voltage_limit", "voltage_V", "V"), None),
-    "i_ref": ("CURRENT_BEFORE", ("current_limit", "peak_current_A", "A"),
-              ("current_rate_limit", "current_rate_A_s", "A/s")),
-    "w_ref": ("SPEED_COMMAND", ("speed_limit", "speed_rad_s", "{speed}"),
-              ("acceleration_limit", "acceleration_rad_s2", "{speed}^2")),
-}  # fmt: skip
+HELD = {"u": "VOLTAGE_BEFORE", "i_ref": "CURRENT_BEFORE", "w_ref": "SPEED_COMMAND"}
+"""Where the state holds each signal that a stage drives."""
 LIFTED = Limits(voltage_V=inf)
 
 
@@ -46,10 +38,6 @@ class Pair:
         rows["torque_filters"] = 0.0  # their gain at once is that of small signals
         return rows
 
-    @property
-    def speed_unit(self) -> str:
-        return "m/s" if self.design.axis == "linear" else "rad/s"
-
     def judged(self, name: str, predicted: float, found: float | None, unit: str, condition: str) -> Row:
         """A row that is exact but for rounding; an absent limit is predicted as none."""
         wanted = predicted if isfinite(predicted) else None
@@ -59,8 +47,8 @@ class Pair:
 
 
 def limit_rows(pair: Pair) -> Iterator[Row]:
-    yield from _limited(pair, rate=False)
-    yield from _limited(pair, rate=True)
+    yield from _limited(pair, "value")
+    yield from _limited(pair, "rate")
     for stage in ("current", "velocity"):
         if stage in pair.design.controller.stages:
             yield from _windup(pair, stage)
@@ -69,12 +57,12 @@ def limit_rows(pair: Pair) -> Iterator[Row]:
     yield from _resolution(pair)
 
 
-def _pushed(rows: Rows, pair: Pair, stage: str, size: float) -> Running:
+def _pushed(rows: Rows, stage: str, size: float) -> Running:
     """One tick in which a stage is asked for ``size`` times its gain; 0 for the command of the drive."""
-    point = {"velocity": "w_ref", "current": "i_ref"}.get(stage)
-    if point is not None:
-        rows.step(point, size, -1.0)
-    return rows.running().begin(size if point is None else None)
+    inner = stage in ("velocity", "current")
+    if inner:
+        rows.step(COMMANDS[stage], size, -1.0)
+    return rows.running().begin(None if inner else size)
 
 
 def _gain(design: Design, stage: str) -> float:
@@ -95,41 +83,41 @@ def _driven(pair: Pair) -> list[tuple[str, str]]:
     own = design.controller.own_law  # without a direct term it answers no command within one tick
     late = own[0] if own is not None and own[1].direct == 0.0 else ""
     stages = [(stage, signal) for stage, signal in wire(design).target.items() if stage != late]
-    outermost = {"velocity": "w_ref", "current": "i_ref", "voltage": "u"}.get(design.controller.outermost)
-    return stages if outermost is None else [*stages, ("", outermost)]
+    outermost = COMMANDS[design.controller.outermost]
+    return [*stages, ("", outermost)] if outermost in HELD else stages
 
 
-def _limited(pair: Pair, *, rate: bool) -> Iterator[Row]:
+def _limited(pair: Pair, kind: Literal["value", "rate"]) -> Iterator[Row]:
     """Speed, current and voltage limit; or the largest change of the speed and of the current command."""
+    limiters = {one.signal: one for one in LIMITERS.values() if one.kind == kind}
     for stage, signal in _driven(pair):
-        place, own_limit, own_rate = LIMITED[signal]
-        if rate and (own_rate is None or (signal == "i_ref" and not stage)):
+        limiter, rate = limiters.get(signal), kind == "rate"
+        if limiter is None or (rate and signal == "i_ref" and not stage):
             continue
-        name, attribute, unit = own_rate if rate and own_rate else own_limit
-        limit, own = (float(getattr(one.limits, attribute)) for one in (pair.model, pair.design))
+        limit, own = (float(limiter.limit_of(one.limits)) for one in (pair.model, pair.design))
         if not isfinite(min(limit, own)):
             continue
         updated = stage or (pair.design.controller.outermost if signal == "w_ref" else "")
         period = wire(pair.design).interval.get(updated, 1) * pair.design.controller.period_s if rate else 1.0
         size = FAR * (min(limit, own) * period) / _gain(pair.design, stage)
-        found = _pushed(pair.rows(only(**{attribute: own})), pair, stage, size).value(place) / period
+        found = _pushed(pair.rows(only(**{limiter.limit: own})), stage, size).value(HELD[signal]) / period
         words = "over one update" if rate else f"a {stage or 'direct'} command far beyond it"
-        unit = unit.format(speed=pair.speed_unit)
+        name, unit = f"{limiter.name}_limit".replace("-", "_"), limiter.unit(pair.design.axis)
         yield pair.judged(name, limit, None if found > 1e3 * limit else found, unit, words)
 
 
 def _windup(pair: Pair, stage: str) -> Iterator[Row]:
     """What the integral does at the limit, over one update from zero (model.md sections 2 and 7)."""
     model, own = (getattr(one.controller, stage) for one in (pair.model, pair.design))
-    _, attribute, unit = LIMITED[wire(pair.design).target[stage]][1]
-    limit, ours = (float(getattr(one.limits, attribute)) for one in (pair.model, pair.design))
+    limiter = CLAMP_OF[wire(pair.design).target[stage]]
+    limit, ours = (float(limiter.limit_of(one.limits)) for one in (pair.model, pair.design))
     if model is None or own is None or model.integral_time_s is None or not isfinite(min(limit, ours)):
         return
     gain = _gain(pair.model, stage)
     T = wire(pair.model).interval.get(stage, 1) * pair.model.controller.period_s
     asked = OVER * limit / gain
-    rows = pair.rows(only(**{attribute: ours}))
-    found = _pushed(rows, pair, stage, asked).value(f"{stage.upper()}_INTEGRATOR")
+    rows = pair.rows(only(**{limiter.limit: ours}))
+    found = _pushed(rows, stage, asked).value(f"{stage.upper()}_INTEGRATOR")
     integral = gain * T / model.integral_time_s * asked
     wanted = 0.0
     if model.anti_windup == "clamped":
@@ -140,8 +128,10 @@ def _windup(pair: Pair, stage: str) -> Iterator[Row]:
             extra = model.resistance_feedforward * (pair.model.effective_motor.resistance_ohm or 0.0) * asked
         over = limit - gain * asked - integral - extra
         wanted = integral + T / (model.tracking_time_s or model.integral_time_s) * over
-    yield judged(f"{stage}_anti_windup", "drive", wanted, found, WITHIN * max(limit, abs(wanted)),
-                 unit=unit, condition=f"integral after one update at {OVER:g} times the limit")  # fmt: skip
+    yield judged(
+        f"{stage}_anti_windup", "drive", wanted, found, WITHIN * max(limit, abs(wanted)), unit=limiter.unit(),
+        condition=f"integral after one update at {OVER:g} times the limit",
+    )  # fmt: skip
 
 
 def _overload(pair: Pair) -> Iterator[Row]:

@@ -3,7 +3,7 @@
 import numpy as np
 import numpy.typing as npt
 
-from actuator_lti.systems.resolvent import balanced
+from actuator_lti.systems.resolvent import balanced, solved_at
 from actuator_lti.types import Complexes, Floats
 
 EPS = float(np.finfo(float).eps)
@@ -70,13 +70,10 @@ def eigenvalues(A: Floats, errors: Floats) -> tuple[Complexes, Floats, Floats]:
 def lifted(A: Floats, B: Floats, C: Floats, D: Floats, points: Complexes) -> Complexes:
     """C (p - A)^-1 B + D at points p = exp(j w period_s), shape (K, M, M).
 
-    Refined once: what is left where large terms cancel is right to the rounding of the entries, so that a
-    faint response has as many digits as they give it.
+    What is left where large terms cancel is right to the rounding of the entries, so that a faint response
+    has as many digits as they give it.
     """
-    turned = points.reshape(-1, 1, 1) * np.eye(len(A)) - A
-    states = np.linalg.solve(turned, np.broadcast_to(B.astype(complex), (points.size, *B.shape)))
-    states += np.linalg.solve(turned, B - turned @ states)
-    return np.asarray(C @ states + D)
+    return np.asarray(C @ solved_at(points.reshape(-1, 1, 1) * np.eye(len(A)) - A, B) + D)
 
 
 def response(A: Floats, B: Floats, C: Floats, D: Floats, z: Complexes) -> Complexes:

@@ -46,12 +46,10 @@ class LoopSetup:
 
     @cached_property
     def outer(self) -> str:
-        """Outermost stage that runs."""
         return self.loop if self.loop in STAGES or not self.wired.stages else self.wired.stages[-1]
 
     @cached_property
     def point(self) -> str:
-        """Where the instrument sits."""
         point = self.outer if self.loop in PATHS else self.loop
         return self.wired.target.get(point, "u" if self.loop in PATHS else self.loop)
 

@@ -211,7 +211,6 @@ def _state(design: Design, p: Floats, functions: list[Leftover]) -> Iterable[Mem
 
 
 def _members(design: Design, functions: list[Leftover], row: str) -> Iterable[Member]:
-    """Inputs or outputs that are used."""
     used = {_begin(node.slice) for node in _elements(functions, row)}
     for place in sorted(used):
         kind: Kind = "int" if place == layout.IO_FLAGS else "float"

@@ -125,7 +125,6 @@ def _value(ours: Controller, struct: Struct, member: Member, row: Floats) -> Flo
 
 
 def after(ours: Controller, vector: Vector) -> Floats:
-    """The state behind a tick of the controller."""
     s = vector[0].copy()
     control_tick(ours.p, s, vector[1].copy())
     return s

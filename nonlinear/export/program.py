@@ -113,12 +113,10 @@ def place_words() -> dict[int, str]:
 
 @cache
 def program() -> Program:
-    """The emitted program."""
     return emit_c(ENTRIES)
 
 
 def template(name: str) -> str:
-    """Text of a file of the templates folder."""
     return files("nonlinear.export").joinpath("templates", name).read_text(encoding="utf-8")
 
 

@@ -30,7 +30,6 @@ class _Way(Tape):
     outcomes: list[bool] = field(default_factory=list)
 
     def condition(self, does: str, terms: tuple[Any, ...], outcome: bool) -> bool:
-        """Note a comparison among the statements."""
         number = len(self.outcomes)
         self.outcomes.append(self.told[number] if number < len(self.told) else outcome)
         return super().condition(does, terms, self.outcomes[-1])

@@ -32,13 +32,11 @@ class Tape:
     count: int = 0
 
     def value(self, does: str, terms: tuple[Any, ...], number: float) -> Traced:
-        """A new intermediate value."""
         self.count += 1
         self._note("value", self.count, does, terms)
         return Traced(self, f"v{self.count}", number)
 
     def condition(self, does: str, terms: tuple[Any, ...], outcome: bool) -> bool:
-        """Note what was found of a value."""
         self._note("condition", int(outcome), does, terms)
         return outcome
 

@@ -25,8 +25,6 @@ Causality = Literal["input", "output", "parameter", "local", "independent"]
 
 @dataclass(frozen=True, kw_only=True)
 class Variable:
-    """One variable."""
-
     name: str
     reference: int
     causality: Causality

@@ -91,7 +91,6 @@ def build_wasm() -> bytes:
 
 
 def kept_wasm() -> bytes:
-    """The module in the package."""
     return files("nonlinear.export").joinpath("wasm", _NAME).read_bytes()
 
 

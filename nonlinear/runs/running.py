@@ -98,11 +98,9 @@ class Running:
         self.p[COLUMNS[column]] = value
 
     def command(self, size: float) -> None:
-        """Hold the command at a value."""
         self.p[at.COMMAND : at.COMMAND + 3] = at.STEP, size, -1.0
 
     def copy(self) -> Running:
-        """The same drive, to be changed."""
         return Running(self.p.copy(), self.s.copy(), self.tables)
 
     def held(self) -> Running | None:
@@ -164,7 +162,6 @@ class Running:
 
     @property
     def probing(self) -> list[str]:
-        """Break points with an instrument."""
         return [point for k, point in enumerate(at.POINTS) if self.p[at.PROBES + k * at.PROBE_SIZE] > 0.0]
 
     def history(self) -> tuple[Floats, npt.NDArray[np.uint16], Floats]:

@@ -49,7 +49,6 @@ class Tables(Compared):
         return self.size - values.size, values.size
 
     def joined(self) -> Floats:
-        """One array for the kernel."""
         return np.concatenate(self.parts) if self.parts else np.zeros(1)
 
 
@@ -126,7 +125,6 @@ _kept_row = lru_cache(maxsize=16)(design_row)  # a design is mostly run more tha
 
 
 def _design_row(design: Design, friction_on: bool, limits_on: bool) -> Floats:
-    """The row of a design alone."""
     try:
         return _kept_row(design, friction_on=friction_on, limits_on=limits_on)
     except TypeError:  # a list in place of a tuple
@@ -199,7 +197,6 @@ def put_supply(row: Floats, design: Design, supply: Command, scales: bool, table
 
 
 def _put_probes(row: Floats, probes: Sequence[Probe], tables: Tables) -> None:
-    """Write the probes, at most one a point."""
     seen = set()
     for probe in probes:
         if probe.point in seen:
@@ -216,7 +213,6 @@ def _put_probes(row: Floats, probes: Sequence[Probe], tables: Tables) -> None:
 
 
 def put_state(row: Floats, state: State) -> None:
-    """Write the initial state."""
     for name, value in vars(state).items():
         if name in STATE_PLACES or (name != "law" and value is not None):
             finite_number(f"initial.{name}", value)

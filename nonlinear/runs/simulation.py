@@ -121,7 +121,6 @@ def simulate(
 
 
 def run_row(design: Design, row: Floats, tables: Floats, progress: Progress = None) -> Trajectory:
-    """Run one row of parameters with its history."""
     drive = Running(*parameters(row), tables)
     history, flags, out = drive.history()
     begun = drive.copy()

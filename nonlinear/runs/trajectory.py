@@ -74,7 +74,6 @@ class LimitUse:
 
     @property
     def active(self) -> bool:
-        """Whether it ever acted."""
         return self.first_time_s is not None
 
 
@@ -318,7 +317,6 @@ class Trajectory(Compared):
         return draw("plot_run", self, axes)
 
     def _repr_html_(self) -> str:
-        """What a notebook shows."""
         return draw("run_html", self)
 
     def __repr__(self) -> str:

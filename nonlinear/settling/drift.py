@@ -76,7 +76,6 @@ class Scales:
         self._p, self._window_s = drive.p, window_s
 
     def take(self, drive: Running, piece: Piece) -> None:
-        """Take a piece in, and the state after it."""
         signals, states = self.signals, self.states
         np.maximum(states, np.abs(drive.s), out=states)
         np.maximum(signals, np.abs(piece.columns[: at.HISTORY_PROBES]).max(axis=1), out=signals)

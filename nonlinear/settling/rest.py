@@ -62,7 +62,6 @@ class Rest:
 
     @property
     def comes_to_rest(self) -> bool:
-        """Whether it does."""
         return self.verdict == "at rest"
 
 
@@ -118,12 +117,10 @@ class _Watch:
     period_s: float = field(init=False)
 
     def __post_init__(self) -> None:
-        """Begin with the state that is there."""
         self.period_s = self.drive.base_ticks * float(self.drive.p[at.PERIOD])
         self.scales = drift.Scales(self.drive, drift.DRIFT * self.period_s)
 
     def judged(self) -> Rest:
-        """Go on until the verdict is known."""
         due, periods = 8, max(PIECE_TICKS // self.drive.base_ticks, 2)
         while not self.spent:
             piece = self._advance(periods)
@@ -181,7 +178,6 @@ class _Watch:
 
     @property
     def spent(self) -> bool:
-        """Whether the work is done."""
         return self.drive.work >= self.most_work
 
     def _gone(self, periods: int) -> Piece:
@@ -329,7 +325,6 @@ class _Watch:
         return early > 0.0 and _alike(early, late)
 
     def _late(self) -> list[tuple[int, int, int]]:
-        """What acted in the last half of the entries."""
         left, result = sum(one[0] for one in self.acted) // 2, []
         for one in reversed(self.acted):
             if left <= 0:
@@ -378,8 +373,6 @@ class _Watch:
 
 @dataclass(frozen=True)
 class _Swing:
-    """Swings of a signal."""
-
     periods: int
     frequency_hz: float | None
     alike: bool
@@ -406,7 +399,6 @@ def _alike(first: float, second: float) -> bool:
 
 
 def _span(moved: Floats) -> float:
-    """Of what moves most."""
     return float(np.ptp(moved, axis=1).max())
 
 

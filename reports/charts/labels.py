@@ -26,11 +26,6 @@ def text_width(words: str, size: float) -> float:
     return size * sum(0.33 if c in NARROW else 0.92 if c in BROAD else 0.6 for c in words)
 
 
-def text_box(words: str, size: float) -> tuple[float, float]:
-    lines = words.split("\n")
-    return max(text_width(line, size) for line in lines), LINE_EM * size * len(lines)
-
-
 @dataclass
 class Room:
     """A frame in which words look for a place; knows what stands there already."""

@@ -6,7 +6,7 @@ import numpy as np
 
 from reports.charts.axis import minor_ticks
 from reports.charts.chart import Curve, Item, Note, Panel, Rule, Shape
-from reports.charts.labels import Room, distance, text_box
+from reports.charts.labels import LINE_EM, Room, distance, text_width
 from reports.charts.pen import FAR, MARKER_PATHS, Frame, Pen
 from reports.visible import escape
 
@@ -164,8 +164,8 @@ LEADER = 26.0  # words further away from their point are tied to it by a line
 
 
 def note_svg(item: Rule | Note, panel: Panel, frame: Frame, pen: Pen, room: Room) -> str:
-    w, h = text_box(item.words, NOTE)
-    size = (w + 6.0, h + 2.0)
+    lines = item.words.split("\n")
+    size = max(text_width(line, NOTE) for line in lines) + 6.0, LINE_EM * NOTE * len(lines) + 2.0
     if isinstance(item, Rule):
         return _rule_words(item, panel, frame, pen, room, size)
     if item.at is None:

@@ -58,12 +58,10 @@ class _Straight:
 
 
 def print_warning(text: str) -> None:
-    """Print one line about something suspicious on standard error."""
-    sys.stderr.write(f"warning: {printable(' '.join(text.split()))}\n")
+    print_note(f"warning: {text}")
 
 
 def print_note(text: str) -> None:
-    """Print one line beside the answer on standard error."""
     sys.stderr.write(f"{printable(' '.join(text.split()))}\n")
 
 

@@ -126,8 +126,6 @@ def _range(field: Field, value: float, top: float) -> tuple[float, float]:
     return value / SLIDER_FACTOR, value * SLIDER_FACTOR
 
 
-def _band(value: float, tolerance: Tolerance) -> list[float] | None:
-    width = tolerance.half_width if tolerance.kind == "uniform" else 2.0 * (tolerance.std or 0.0)
-    if width is None or not math.isfinite(width):
-        return None
+def _band(value: float, tolerance: Tolerance) -> list[float]:
+    width = tolerance.width * (1.0 if tolerance.kind == "uniform" else 2.0)
     return [max(value - width, tolerance.lower), min(value + width, tolerance.upper)]

@@ -20,7 +20,7 @@ from actuator_lti.files.reading import Tree
 from analyses.large_signal.classify import FRICTION_DB, FRICTION_DEG, STICK_FRACTION
 from analyses.large_signal.tones import LEAST_UPDATES, full_command
 from analyses.linear.loop_figures import HELD
-from analyses.monte_carlo.judging import in_populations
+from analyses.monte_carlo.judging import in_populations, loops_of
 from nonlinear.export import linear, page
 from nonlinear.export.c_files import exported_row
 from nonlinear.export.relations import relation_statements
@@ -28,6 +28,7 @@ from reports.live.charts import BORDERS
 from reports.live.keys import Figure, followed
 from reports.live.text import patches
 from reports.sections.limits import COLOURS, WORDS
+from reports.sections.names import command_unit
 from reports.sections.requirements import limit_words
 
 CONTACT = 'The coupling of the loops is in contact, its torque in the direction of motion ("driving").'
@@ -62,7 +63,7 @@ def live_model(design: Design, source: str | None = None) -> Tree:
         "lines": result.lines,
         "row": [value if math.isfinite(value) else str(value) for value in map(float, row)],
         "places": {**page.PLACES, "outer": outer},
-        "loops": [name for name in LOOPS if name in design.controller.stages],
+        "loops": loops_of(design),
         "stages": {name: k for k, name in enumerate(LOOPS)},
         "points": POINTS,
         "point": _point(design),
@@ -119,8 +120,7 @@ def _judged(
 
     ``figures``: those of the whole drive that follow, each with its statements.
     """
-    stages = tuple(name for name in LOOPS if name in design.controller.stages)
-    followed: list[Tree] = []
+    stages, followed = loops_of(design), list[Tree]()
     apart: list[Tree] = []
     for item in design.requirements:
         words, load = QUANTITIES[item.quantity].words, item.load_Nm or 0.0
@@ -139,13 +139,10 @@ def _judged(
 
 def _step(design: Design) -> Tree:
     """Give the command of the step (a tenth of the largest), and what it is a step of."""
-    linear_axis, full, outermost = design.axis == "linear", full_command(design), design.controller.outermost
-    if outermost == "position":
-        unit, factor = ("mm", 1e-3) if linear_axis else ("deg", math.pi / 180.0)
-        return {"size": 0.1 * full, "unit": unit, "factor": factor, "of": "output"}
-    if outermost == "velocity":
-        return {"size": 0.1 * full, "unit": "m/s" if linear_axis else "rad/s", "factor": 1.0, "of": "speed"}
-    return {"size": 0.1 * full if math.isfinite(full) else 1.0, "unit": "A", "factor": 1.0, "of": "current"}
+    full, (scale, unit) = full_command(design), command_unit(design)
+    of = {"position": "output", "velocity": "speed"}.get(design.controller.outermost, "current")
+    size = 0.1 * full if math.isfinite(full) else 1.0
+    return {"size": size, "unit": unit, "factor": 1.0 / scale, "of": of}
 
 
 def _map(design: Design) -> Tree | None:

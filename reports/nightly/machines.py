@@ -1,6 +1,5 @@
 """A night for machines: JUnit XML, ``summary.json`` and a Markdown summary for a pull request."""
 
-import json
 from dataclasses import asdict
 from xml.etree import ElementTree as Xml
 
@@ -38,10 +37,6 @@ def summary(night: Overview) -> Tree:
         "gone": list(night.gone),
         "designs": [_design(d) for d in night.designs],
     }
-
-
-def summary_text(night: Overview) -> str:
-    return json.dumps(summary(night), ensure_ascii=True, allow_nan=False, indent=1) + "\n"
 
 
 def _design(design: DesignView) -> Tree:

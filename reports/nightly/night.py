@@ -78,7 +78,8 @@ def run_night(
     jobs = check_jobs(study.jobs, study.name)
     version = code or code_version()
     with _held(study, site, use) as (history, cache):
-        site_files.remove_leftovers(site, history.state)
+        for left_over in (path for folder in (site, history.state) for path in folder.rglob(".*.part")):
+            left_over.unlink(missing_ok=True)
         site_files.mark(site)
         run = history.start_run(
             started=clock(), code=version.hash, code_commit=version.commit,

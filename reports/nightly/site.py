@@ -6,11 +6,12 @@ Layout: ``index.html`` (the only page that is ever replaced), ``nights/<night>/`
 before it is put in place, and is removed only when no page of a kept night refers to it.
 """
 
+import json
 import os
 import re
 import secrets
 import shutil
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 
 from actuator_lti.errors import InputError
@@ -25,9 +26,11 @@ from reports.nightly.view import DesignView, Overview, overview, report_folder, 
 MARKER = ".nightly-site"
 KEPT_NIGHTS = 3
 KEPT_CACHE_DAYS = 30.0
-_FOR_MACHINES = {
-    "summary.json": machines.summary_text, "junit.xml": machines.junit, "summary.md": machines.markdown
-}  # fmt: skip
+_FOR_MACHINES: dict[str, Callable[[Overview], str]] = {
+    "summary.json": lambda night: json.dumps(machines.summary(night), allow_nan=False, indent=1) + "\n",
+    "junit.xml": machines.junit,
+    "summary.md": machines.markdown,
+}
 _NIGHT = re.compile(r"\d{6,}-[0-9a-f]{8}\Z")
 _CONTENT = re.compile(r"[0-9a-f]{16}\Z")
 
@@ -51,11 +54,6 @@ def check_place(site: Path) -> None:
 def mark(site: Path) -> None:
     """Make a folder a site; one that is a site already stays it."""
     write_text(site / MARKER, "actuator-lti nightly site 1\n")
-
-
-def remove_leftovers(*folders: Path) -> None:
-    for leftover in (path for folder in folders for path in folder.rglob(".*.part")):
-        leftover.unlink(missing_ok=True)
 
 
 def publish(

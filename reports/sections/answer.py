@@ -6,6 +6,7 @@ from typing import cast
 
 from actuator_lti.asked.quantities import AT_A_GLANCE, QUANTITIES, reserve, shown_unit
 from actuator_lti.design.model import Design
+from actuator_lti.design.writing import value_as_stated
 from analyses.corners.run import Corners
 from analyses.linear.loop_figures import HELD, LoopFigures
 from analyses.linear.responses import frequency_grid
@@ -14,8 +15,7 @@ from analyses.specification.weakest import Spread, View, WeakPoint
 from analyses.tuning.problem import SPAN
 from reports import document as doc
 from reports.document_schema import Bar, GlanceBlock, GlanceFigure, GlanceLoop, Weakest
-from reports.live.keys import named
-from reports.numbers import capital, power_of_ten, short
+from reports.numbers import capital, power_of_ten, prose, short
 from reports.sections import loop as loop_section
 from reports.sections import loop_charts
 from reports.sections.margins import margin_row, range_words, shown, worst_status
@@ -118,10 +118,8 @@ def move_words(design: Design, move: Move) -> str:
     >>> move_words(load_design("ilr33-amber"), Move("control.velocity.integral_time", 0.015, 0.0286))
     'control.velocity.integral_time 15 ms to 28.6 ms mends it'
     """
-    key = named(design, move.path)
-    unit = f" {key['unit']}" if key["unit"] else ""
-    was, value = (f"{short(value / key['factor'], 4)}{unit}" for value in (move.was, move.value))
-    return f"{move.path} {was} to {value} mends it"
+    was, value = (value_as_stated(design, move.path, value) for value in (move.was, move.value))
+    return prose(f"{move.path} {was} to {value} mends it")
 
 
 def _loop(

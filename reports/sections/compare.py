@@ -17,7 +17,7 @@ from analyses.validation.row import Row as Check
 from reports import document as doc
 from reports.as_json import as_json
 from reports.html import show_signed
-from reports.numbers import capital, row_time_unit, significant
+from reports.numbers import capital, row_unit, significant
 from reports.sections import compare_best, compare_figures
 from reports.sections.compare_best import SEEN, number, unstable_words
 from reports.sections.names import LOOPS
@@ -191,9 +191,7 @@ def _cell(comparison: Comparison, one: Compared, name: FigureName) -> str | None
 
 def _scaled(comparison: Comparison, name: FigureName) -> tuple[float, str]:
     """Factor and unit of a figure's row, the same for all designs."""
-    if name.unit == "s":
-        return row_time_unit(one.figures.get(name.key) for one in comparison.everything.all)
-    return 1.0, name.unit.replace("^2", "²")
+    return row_unit(name.unit, (one.figures.get(name.key) for one in comparison.everything.all))
 
 
 def differences(comparison: Comparison) -> doc.Section:
@@ -227,7 +225,7 @@ def _moved_table(one: Compared, comparison: Comparison) -> doc.Block:
 
     columns = [
         _OF_GROUP,
-        doc.of("unit", "unit", "Unit"),
+        doc.of(lambda name: unit_words(name.unit), "unit", "Unit"),
         doc.of(lambda name: comparison.base.figures[name.key], "base", "Base", format="sig:4"),
         doc.of(lambda name: one.figures[name.key], "value", "Variant", format="sig:4"),
         doc.of(lambda name: one.differences[name.key], "difference", "Difference", format="sig:3"),
@@ -269,8 +267,7 @@ def ledger(comparison: Comparison) -> list[doc.Section]:
 
 
 def _ledger_cell(one: Compared, wanted: Check) -> doc.Cell:
-    key = (wanted.loop, wanted.name, wanted.condition)
-    entry = next((each for each in one.checks if (each.loop, each.name, each.condition) == key), None)
+    entry = next((each for each in one.checks if each.key == wanted.key), None)
     if entry is None:
         return None
     status = entry.verdict.role()

@@ -32,7 +32,7 @@ def section(result: Duty) -> doc.Section:
     table = doc.table("What the duty asks of the motor", _COLUMNS, _rows(result), note)
     told = doc.severity(result.verdict)
     told = "warn" if told == "info" and result.limited else told
-    own = requirements.table(result.requirements, result.design.load_unit)
+    own = requirements.table(result.requirements)
     blocks, words = [table, *own, _figure(result)], summary(result)
     return doc.section("duty", "Duty cycle", blocks, result=words, intro=intro, status=told, told=told)
 
@@ -67,7 +67,7 @@ def asked_words(result: Duty) -> str:
 def summary(result: Duty) -> str:
     limited = f"; it is not followed as asked, limited by {' and '.join(result.limited)}"
     said = f"{asked_words(result)} is {RATED[result.rated]}: {_found(result)}"
-    return said + limited * bool(result.limited) + f". {requirements.told(result.requirements)}".rstrip()
+    return said + limited * bool(result.limited) + f". {requirements.result(result.requirements)}".rstrip()
 
 
 def _found(result: Duty) -> str:

@@ -34,9 +34,10 @@ def section(result: Failures) -> doc.Section:
         held = f"turns at a command of {out.per('s').of(asked.speed_rad_s)}{acting(result.before[0].rest)}"
     if swing is not None:
         held = f"{_unsteady(result)}, {told(result.design, swing, *command_unit(result.design))},"
+    stop = f"the stop is {out.of(asked.stop_rad, 4)} away" if asked.stop_rad < inf else "no stop is stated"
     intro = (
         f"Each failure is simulated from a drive that {held} under {load} (positive pushes forward). "
-        f"Deflection counts from where the output was; {_stop(result, out)}, and "
+        f"Deflection counts from where the output was; {stop}, and "
         f"detection takes {1e3 * asked.detection_s:.4g} ms. The {push} is that in the coupling"
     )
     rigid = (
@@ -45,7 +46,7 @@ def section(result: Failures) -> doc.Section:
     )
     intro += rigid * (result.design.coupling is None) + "."
     left = [f"{NAMES[name]}: not for this drive, as {why}." for name, why in result.left_out.items()]
-    own = requirements.table(result.requirements, result.design.load_unit)
+    own = requirements.table(result.requirements)
     blocks = [_table(result, out), *own, _figure(result, out), *map(doc.text, left)]
     status = told_as = "info" if result.verdict is None else doc.severity(result.verdict)
     if status == "info" and verdict_of(result.design, swing) is not Verdict.MET:
@@ -61,11 +62,6 @@ def _turns(result: Failures) -> bool:
 
 def _unsteady(result: Failures) -> str:
     return f"does not {'become steady' if _turns(result) else 'come to rest'}"
-
-
-def _stop(result: Failures, out: Unit) -> str:
-    stop = result.asked.stop_rad
-    return f"the stop is {out.of(stop, 4)} away" if stop < inf else "no stop is stated"
 
 
 def summary(result: Failures) -> str:
@@ -88,7 +84,7 @@ def summary(result: Failures) -> str:
     if swing is not None and verdict_of(result.design, swing) is not Verdict.MET:
         does = f"{_unsteady(result)} under {result.asked.load_Nm:g} {result.design.load_unit}"
         words += f"; before it the drive {does}: {told(result.design, swing, *command_unit(result.design))}"
-    return f"{NAMES[worst.name]} {words}. {requirements.told(result.requirements)}".rstrip()
+    return f"{NAMES[worst.name]} {words}. {requirements.result(result.requirements)}".rstrip()
 
 
 def _table(result: Failures, out: Unit) -> doc.Block:

@@ -9,6 +9,7 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
+from scipy.ndimage import distance_transform_edt
 
 from actuator_lti.design.model import Design
 from actuator_lti.drive.signals import LIMITERS
@@ -198,8 +199,6 @@ def _onsets(panel: style.Panel, hertz: np.ndarray, each_rad: Mapping[str, np.nda
 
 def _deepest(mask: np.ndarray) -> tuple[int, int]:
     """Give the point furthest inside a region, weighing rows as two columns."""
-    outside, inside = np.argwhere(~np.pad(mask, 1)) - 1, np.argwhere(mask)
-    gaps = inside[:, None, :] - outside[None, :, :]
-    depth = np.hypot(1.6 * gaps[..., 0], 0.6 * gaps[..., 1]).min(axis=1)
-    row, column = inside[int(np.argmax(depth))]
+    depth = distance_transform_edt(np.pad(mask, 1), sampling=(1.6, 0.6))[1:-1, 1:-1]
+    row, column = np.unravel_index(int(np.argmax(depth)), depth.shape)
     return int(row), int(column)

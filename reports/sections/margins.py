@@ -97,7 +97,7 @@ CROSSING_COLUMNS = [
 
 def section(result: Margins) -> list[doc.Section]:
     """Make the sections from `analyses.margins.margins`: the loops as asked for, the requirements."""
-    judged, known = requirements.section(result.requirements, result.design.load_unit), _named(result)
+    judged, known = requirements.section(result.requirements), _named(result)
     how = f"{FORMS[result.asked.form].capitalize()}; {_where(result)}. "
     made = _loops(known, result.operating_points, how)
     made["blocks"] += map(doc.text, _notes(result, known))

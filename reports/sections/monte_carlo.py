@@ -14,7 +14,7 @@ from analyses.monte_carlo.result import ColumnStatistics, Driver, MonteCarloResu
 from reports import document as doc
 from reports.charts import style
 from reports.charts.axis import linear_ticks
-from reports.numbers import capital, or_none
+from reports.numbers import or_none
 from reports.sections.names import in_shown
 from reports.sections.requirements import label, limit_words
 from reports.terminal import Brief
@@ -94,7 +94,7 @@ def _verdict(result: MonteCarloResult, odds: Odds) -> doc.VerdictItem:
     share = odds.probability if result.at_least is None else odds.low
     verdict = result.judged(odds)
     return doc.verdict(
-        f"tolerance/{odds.id}", f"{capital(odds.label)}{_MET_WITHIN}", passed=verdict, comparison=">=",
+        f"tolerance/{odds.id}", f"{odds.label}{_MET_WITHIN}", passed=verdict, comparison=">=",
         value=100.0 * odds.probability, limit=100.0 * wanted, distance=100.0 * (share - wanted), unit="%",
         reason=_why(result, odds), waiver=odds.waiver if verdict is Verdict.NOT_PROVEN else None,
     )  # fmt: skip

@@ -78,8 +78,7 @@ def tolerance_words(item: Parameter) -> str:
     tolerance = item.tolerance
     if tolerance is None:
         return ""
-    width = tolerance.half_width if tolerance.kind == "uniform" else tolerance.std
-    text = tolerance.text or ("" if width is None else f"{width:.3g}")
+    text = tolerance.text or f"{tolerance.width:.3g}"
     return f"±{text}" if tolerance.kind == "uniform" else f"σ {text}, {tolerance.kind}"
 
 

@@ -7,13 +7,13 @@ from actuator_lti.asked.quantities import shown_unit
 from actuator_lti.asked.verdict import Verdict
 from actuator_lti.design.model import Requirement
 from analyses.monte_carlo.result import Odds
-from analyses.specification.requirements import RequirementVerdict, tally
+from analyses.specification.requirements import RequirementVerdict, tally, words_of
 from reports import document as doc
-from reports.sections.names import QUANTITIES, in_shown
+from reports.sections.names import in_shown
 from reports.verdict_summary import worded
 
 
-def section(verdicts: Sequence[RequirementVerdict], load_unit: str = "N m") -> doc.Section:
+def section(verdicts: Sequence[RequirementVerdict]) -> doc.Section:
     id, title = "verdicts", "Requirements"
     if not verdicts:
         return doc.section(id, title, [], result="The design states no requirements.")
@@ -21,11 +21,14 @@ def section(verdicts: Sequence[RequirementVerdict], load_unit: str = "N m") -> d
         "Requirements of the design file, judged on the sampled loops with sliding friction. "
         "Distance is what is left to the limit, negative where it is missed."
     )
-    blocks, status = [doc.verdicts(item(one, load_unit) for one in verdicts)], tally(verdicts).role
+    blocks, status = [doc.verdicts(map(item, verdicts))], tally(verdicts).role
     return doc.section(id, title, blocks, result=result(verdicts), intro=intro, status=status)
 
 
 def result(verdicts: Sequence[RequirementVerdict]) -> str:
+    """What is met and what is not; empty without any."""
+    if not verdicts:
+        return ""
     said = [f"{tally(verdicts).words('requirements')}."]
     for word in (Verdict.NOT_MET, Verdict.NOT_PROVEN):
         names = [label(one) + (" (waived)" if one.waiver else "") for one in verdicts if one.verdict == word]
@@ -33,48 +36,34 @@ def result(verdicts: Sequence[RequirementVerdict]) -> str:
     return " ".join(said)
 
 
-def told(verdicts: Sequence[RequirementVerdict]) -> str:
-    """What an analysis says of the requirements on what it finds; empty without any."""
-    return result(verdicts) if verdicts else ""
-
-
-def table(
-    verdicts: Sequence[RequirementVerdict], load_unit: str, title: str = "Requirements"
-) -> list[doc.Block]:
+def table(verdicts: Sequence[RequirementVerdict], title: str = "Requirements") -> list[doc.Block]:
     """Requirements that are counted elsewhere too: as a table, if there are any."""
     columns = [
         doc.of("id", "id", "Requirement"),
-        doc.of(lambda v: label(v, load_unit), "label", "What"),
+        doc.of(label, "label", "What"),
         doc.of(lambda v: in_shown(v.value, v.requirement.unit), "value", "Found", format="sig:4"),
         doc.of(lambda v: limit_words(v.requirement), "limit", "Limit"),
-        doc.of(lambda v: worded(item(v, load_unit)), "verdict", "Verdict"),
+        doc.of(lambda v: worded(item(v)), "verdict", "Verdict"),
     ]
     return [doc.listing(title, verdicts, columns, status=lambda v: v.role)] if verdicts else []
 
 
-def item(verdict: RequirementVerdict, load_unit: str = "N m") -> doc.VerdictItem:
+def item(verdict: RequirementVerdict) -> doc.VerdictItem:
     requirement = verdict.requirement
     limit, comparison = _limit(verdict)
     unlimited = "unlimited" * (verdict.value is not None and math.isinf(verdict.value))
     source, note = requirement.source, requirement.note
     source += f" ({note})" if note and note != source else ""
     made = doc.verdict(
-        verdict.id, label(verdict, load_unit), passed=verdict.verdict, value=verdict.value, limit=limit,
+        verdict.id, label(verdict), passed=verdict.verdict, value=verdict.value, limit=limit,
         distance=verdict.distance, comparison=comparison, unit=requirement.unit, source=source,
         reason=verdict.reason or unlimited, waiver=verdict.waiver,
     )  # fmt: skip
     return {**made, "loop": verdict.loop, "quantity": requirement.quantity}
 
 
-def label(verdict: RequirementVerdict, load_unit: str = "N m") -> str:
-    requirement = verdict.requirement
-    what = QUANTITIES.get(requirement.quantity, requirement.quantity)
-    if verdict.loop is not None:
-        rotor = f", rotor {verdict.rotor}" if verdict.rotor else ""
-        to = f", to the {requirement.to}" if requirement.to and verdict.loop == "position" else ""
-        return f"{verdict.loop.capitalize()} loop{rotor}: {what}{to}"
-    load = "" if requirement.load_Nm is None else f" at {requirement.load_Nm:g} {load_unit}"
-    return f"Drive: {what}{load}"
+def label(verdict: RequirementVerdict) -> str:
+    return words_of(verdict.requirement, verdict.loop, verdict.load_unit, verdict.rotor)
 
 
 def limit_words(of: Requirement | Odds) -> str:

@@ -30,7 +30,7 @@ def section(result: Stiffness) -> doc.Section:
     unit = f"{result.design.load_unit}/{'m' if result.design.axis == 'linear' else 'rad'}"
     blocks = [
         *(*_figure(result, unit), _table(result, unit)),
-        *requirements.table(result.requirements, result.design.load_unit),
+        *requirements.table(result.requirements),
         *([_lost_motion(result)] if result.lost_motion else []),
         *([_at_rest(result, unit)] if result.at_rest else []),
         *([_checks(result, unit)] if result.checks else []),
@@ -67,7 +67,7 @@ def _result(result: Stiffness, unit: str) -> str:
         words += " (relative)"
     elif result.unproven:
         words += f"; nothing is compared: {result.unproven}"
-    return f"{words}. {requirements.told(result.requirements)}".rstrip()
+    return f"{words}. {requirements.result(result.requirements)}".rstrip()
 
 
 def _figure(result: Stiffness, unit: str) -> list[doc.Block]:

@@ -15,11 +15,11 @@ from reports.sections.requirements import item, label, table
 
 
 def section(result: TuningResult) -> doc.Section:
-    others = (item(one, result.before.load_unit) for one in result.others)
-    verdicts = doc.verdicts([*(_verdict(r, result.before) for r in result.requirements), *others])
+    searched = (_verdict(one, result.before) for one in result.requirements)
+    verdicts = doc.verdicts([*searched, *map(item, result.others)])
     blocks: list[doc.Block] = [
         *(verdicts, gains(result)),
-        *table(result.confirmed, result.before.load_unit, "Confirmed by certified margins"),
+        *table(result.confirmed, "Confirmed by certified margins"),
         *([_curve(result)] if result.trade_off else []),
         *([checks(result)] if result.checks else []),
         *map(doc.remark, result.notes),
@@ -43,7 +43,7 @@ def summary(result: TuningResult) -> str:
         told.append("The tuned design meets every other requirement.")
     for word in (Verdict.NOT_MET, Verdict.NOT_PROVEN):
         open_ones = (one for one in result.others if one.verdict == word and not one.passes)
-        names = "; ".join(label(one, result.before.load_unit) for one in open_ones)
+        names = "; ".join(map(label, open_ones))
         told += [f"{word.capitalize()}, and not searched for: {names}."] if names else []
     return " ".join(told)
 

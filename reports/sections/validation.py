@@ -6,7 +6,6 @@ from dataclasses import asdict, replace
 from decimal import ROUND_UP, Context
 from typing import Any, cast
 
-from actuator_lti.asked.quantities import unit_words
 from actuator_lti.asked.verdict import Verdict
 from actuator_lti.design.checks import CHECKS
 from actuator_lti.drive.signals import LIMITERS
@@ -14,7 +13,7 @@ from analyses.motion.settling import waiver_of_rest
 from analyses.validation.result import Validation
 from analyses.validation.row import Row as Check
 from reports import document as doc
-from reports.numbers import capital, gain_margin, prose, row_time_unit
+from reports.numbers import capital, gain_margin, prose, row_unit
 from reports.sections import beyond, friction_effects, in_time, large_signal, specification
 from reports.sections.names import LOOPS, POINTS, QUANTITIES, loop_words
 from reports.terminal import Brief
@@ -190,7 +189,7 @@ def table(rows: Sequence[Check], caption: str) -> doc.Block:
 
 
 def _scaled(row: Check) -> tuple[float, str]:
-    return row_time_unit([row.predicted, row.found]) if row.unit == "s" else (1.0, unit_words(row.unit))
+    return row_unit(row.unit, [row.predicted, row.found])
 
 
 def _rounded(row: Check, value: float | None, digits: int) -> float | None:

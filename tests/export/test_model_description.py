@@ -14,7 +14,7 @@ from programs import needs_compiler
 
 import reports.model_picture as model_picture
 from actuator_lti import Design, load_design
-from actuator_lti.design import shipped_designs
+from actuator_lti.design import shipped_designs, with_values
 from nonlinear.export import fmu_bytes
 from reports.model_picture import HEIGHT, WIDTH, model_png, model_svg, train_boxes
 from tests.changed import changed
@@ -134,6 +134,8 @@ def test_the_coupling_stands_behind_its_gear() -> None:
     assert [title for title, _ in train_boxes(inside)] == ["motor", "spur", "coupling", "belt", "load"]
     motor = replace(inside, gears=(), coupling=replace(inside.coupling, after=None))
     assert [title for title, _ in train_boxes(motor)] == ["motor", "coupling", "load"]
+    sliding = with_values(load_design("ballscrew"), {"coupling.play": 1e-4})
+    assert dict(train_boxes(sliding))["coupling"] == "play 0.1 mm"
 
 
 @needs_typesetter

@@ -215,6 +215,10 @@ def test_jitter_is_resampled_with_an_error_that_holds_and_a_gap_within_the_toler
         open_record(tmp_path / "r.toml").resampled()
 
 
+def _signal(text: str) -> Callable[[Path], None]:
+    return lambda path: _described(path, 'file = "r.csv"', 'time = { column = "t" }', f"signals.{text}")
+
+
 @pytest.mark.parametrize(("write", "reason"), [
     (lambda p: savemat(p / "r.mat", {"X": TABLE}), "layout is not known"),
     (lambda p: (p / "r.mat").write_bytes(b"MATLAB"), "too short"),
@@ -228,7 +232,11 @@ def test_jitter_is_resampled_with_an_error_that_holds_and_a_gap_within_the_toler
     (lambda p: (p / "r.csv.gz").write_bytes(gzip.compress(b"a,b\n1,2\n")), "binary or packed"),
     (lambda p: (p / "r.csv").write_bytes(bytes(range(256))), "binary or packed"),
     (lambda p: (p / "r.csv").write_text("time_s,i_A\n1,2\n1,3\n2,3"), 'disorder = "drop" in a record'),
-    (lambda p: (p / "r.toml").write_text('file = "r.csv"\nseperator = ";"\n'), 'mean "separator"'),
+    (lambda p: _described(p, 'file = "r.csv"', 'seperator = ";"'), 'mean "separator"'),
+    (_signal('banana = { column = "i", unit = "A" }'), "no signal that is known"),
+    (_signal('curent = { column = "i", unit = "A" }'), 'did you mean "current"'),
+    (_signal('current = { column = "i", unit = "V" }'), "must be a unit like A"),
+    (_signal('current = { column = "i", unit = "A", value = "mean" }'), "one of dc, rms, peak"),
 ])  # fmt: skip
 def test_what_cannot_be_read_says_why(write: object, reason: str, tmp_path) -> None:
     write(tmp_path)

@@ -162,20 +162,6 @@ def test_a_current_sampled_too_slowly_is_named(identify) -> None:
     assert any("sampled too slowly" in reason for reason in failed)
 
 
-def test_a_stepped_command_is_taken_as_steps(tmp_path, cli) -> None:
-    """Logged at every tenth tick: taken as ramps of a millisecond, the current would be off by 20 %."""
-    design = changed(bare("ilr33-amber"), controller={"position": None})
-    time = np.arange(0.0, 1.5, 1e-4)
-    speed = np.select([time < 0.2, time < 0.6, time < 1.0], [0.0, 300.0, -450.0], 200.0)
-    run = simulate(design, commands.sampled(time, speed / design.total_ratio), 1.5, record_every=10)
-    speed = {"target_speed [rad/s]": design.total_ratio * run.reference_rad}
-    speed["motor_speed [rad/s]"] = run.motor_speed_rad_s
-    write(tmp_path / "r.csv", {"time_s": run.time_s, **speed, "current_A": run.current_A})
-    (tmp_path / "d.toml").write_text(write_design(design))
-    summary = cli("correlate", tmp_path / "d.toml", tmp_path / "r.csv", "--json").data["summary"]
-    assert max(summary[name]["relative_error"] for name in ("current", "speed")) < 1e-6
-
-
 def test_correlate_begins_with_its_result_and_judges_on_demand(tmp_path, cli) -> None:
     design = bare("ctms-motor-position")
     run = simulate(design, commands.multisine(1.0, [0.5, 1.1], 4.0, 1e-3, seed=2), 4.0)

@@ -11,7 +11,7 @@ from actuator_lti.design import load_design, parameter_value, with_values
 from analyses.identification.to_design import inertia_share
 from analyses.records.consistency import check_record
 from nonlinear import commands, simulate
-from tests.identification.bench_records import Columns, bare, columns_of, motion, record_of, write
+from tests.identification.bench_records import Columns, bare, columns_of, motion, record_of
 from tests.refusals import refused
 
 
@@ -63,20 +63,6 @@ def test_a_residual_above_the_level_writes_nothing_unless_accepted(right, tmp_pa
     assert words in (tmp_path / "o" / "identification.html").read_text()
     asked = ("--design", "ilr33-amber", "--cutoff", "400", "--accept", "--out", tmp_path / "o")
     assert words in " ".join(cli.text("identify", tmp_path / "r.csv", *asked, status=1).split())
-
-
-@pytest.mark.parametrize(("signal", "reason"), [
-    ('signals.banana = { column = "current_A", unit = "A" }', "signals.banana: no signal that is known"),
-    ('signals.curent = { column = "current_A", unit = "A" }', 'did you mean "current"?'),
-    ('signals.current = { column = "current_A", unit = "V" }', "must be a unit like A"),
-    ('signals.current = { column = "current_A", unit = "A", value = "mean" }', "one of dc, rms, peak"),
-])  # fmt: skip
-def test_a_signal_that_nothing_reads_is_refused(signal, reason, right, tmp_path, cli) -> None:
-    write(tmp_path / "r.csv", right)
-    text = f'file = "r.csv"\ntime = {{ column = "time_s" }}\n{signal}\n'
-    (tmp_path / "r.toml").write_text(text)
-    err = cli.refused("identify", tmp_path / "r.toml", "--design", "ilr33-amber")
-    assert reason in err
 
 
 def _slow_sensor(folder: Path) -> None:

@@ -7,7 +7,15 @@ import numpy as np
 
 from actuator_lti import assemble_loops, load_design
 from actuator_lti.design.law import LAW_INPUTS, LAW_WORDS, Law
-from actuator_lti.design.model import Command, Design, Encoder, Instruments, Limits, OutputEncoder
+from actuator_lti.design.model import (
+    Command,
+    Design,
+    Encoder,
+    Instruments,
+    Limits,
+    OutputEncoder,
+    Temperature,
+)
 from actuator_lti.loops.tick import compose
 from nonlinear import Rows, Trajectory
 from tests.changed import changed
@@ -15,6 +23,9 @@ from tests.changed import changed
 SIZES = {"command": 1.0, "error": 1.0, "speed": 1e-3, "angle": 0.1, "current": 1e-2, "output_angle": 0.1,
          "output_speed": 1e-3, "twist": 1.0}  # fmt: skip
 STAGES = ("current", "velocity", "position")
+FILTERED = ("filter_time_s", "filter_order", "filter_damping")
+SIGNALS = {"th": "motor_angle_rad", "w": "motor_speed_rad_s", "i": "current_A", "u": "voltage_V"}
+TICKS = 400
 BASES = ("ilr33-amber-multirate", "joint", "emps", "ilr33-amber")
 
 
@@ -38,6 +49,18 @@ def linear(design: Design) -> Design:
     parts |= {"coupling": design.coupling and {"play_rad": 0.0}}
     parts |= {"controller": {"position": design.controller.position and {"friction_feedforward": 0.0}}}
     return changed(design, command=Command(), instruments=Instruments(), **parts)
+
+
+def laid_bare(design: Design) -> Design:
+    """The linear part of a drive: of its command the filter, of its friction what grows with the load."""
+    command, motor = design.command, replace(design.effective_motor, constants="dc", cogging_Nm=0.0)
+    kept = replace(Command(), **{name: getattr(command, name) for name in FILTERED})
+    bare = replace(linear(design), motor=motor, temperature=Temperature(), command=kept)
+    line = dict.fromkeys(("torque_1_Nm", "stiffness_2_Nm_rad", "torque_2_Nm", "stiffness_3_Nm_rad"))
+    return changed(
+        bare, friction={"load_coefficient": design.friction.load_coefficient}, load={"gear_error_Nm": 0.0},
+        encoder=replace(design.encoder, counts_per_rev=None), coupling=bare.coupling and line,
+    )  # fmt: skip
 
 
 def stepped(design: Design, ticks: int, size: float, **settings: Any) -> Trajectory:
@@ -98,6 +121,25 @@ def drawn(case: int, stable: bool = False) -> tuple[Design, str] | None:
         counted = Encoder(speed="difference", difference_samples=3)
         design = replace(design, encoder=(tracking, counted)[int(rng.integers(2))])
     return random_law(rng, design, stage, stable=stable, words=LAW_WORDS), stage
+
+
+def same_run(design: Design, case: object, rng: np.random.Generator) -> None:
+    """Simulator without limits and linear map, tick by tick, under a sine, a ramp and a load."""
+    t = np.arange(TICKS)
+    command = 1e-2 * (np.sin(t * rng.uniform(0.01, 0.1)) + 1e-3 * t)
+    rows = Rows.of(design, limits_on=False)
+    rows["ticks"], rows["load"] = TICKS, 0.1
+    rows.series("command", command)
+    system = assemble_loops(design).tick_system
+    scale = design.total_ratio if design.controller.outermost == "velocity" else 1.0  # it is the motor's
+    with np.errstate(over="ignore", invalid="ignore"):
+        run, linear = rows.trajectory(), system.respond(scale * command, 0.0, None, 0.1)
+    for name, ours in SIGNALS.items():
+        if name not in linear:
+            continue
+        some = np.maximum.accumulate(np.abs(linear["w"])) < 1e12
+        most = np.abs(linear[name][some]).max()
+        assert np.abs(getattr(run, ours) - linear[name])[some].max() <= 1e-9 * most, (case, name)
 
 
 class PlainLaw:

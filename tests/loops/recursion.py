@@ -43,11 +43,10 @@ def plant(design: Design, contact: float) -> tuple[np.ndarray, np.ndarray]:
 
 
 class Unlimited(Controller):
-    """Without limits; what is injected adds to w_ref, i_ref or u behind the values that are kept."""
+    """Without limits."""
 
-    def __init__(self, design: Design, inject: dict[str, np.ndarray]) -> None:
+    def __init__(self, design: Design) -> None:
         super().__init__(replace(design, limits=Limits(voltage_V=inf)))
-        self.inject, self.values = inject, {"w_ref": [], "i_ref": [], "u": []}
 
     def limit_outer(self, v: float) -> float:
         return v
@@ -55,16 +54,11 @@ class Unlimited(Controller):
     def slope(self, target: float, every: int) -> float:
         return target
 
-    def at(self, point: str, value: float, k: int) -> float:
-        self.values[point].append(value)
-        return value + self.inject[point][k] if point in self.inject else value
 
-
-def run(design, command, torque_Nm=0.0, moment_Nm=0.0, contact=1.0, initial=(0.0, 0.0, 0.0), inject=None):
+def run(design, command, torque_Nm=0.0, moment_Nm=0.0, contact=1.0, initial=(0.0, 0.0, 0.0)):
     """Run the drive while it slips forward, the command at the motor where the outermost stage is the speed.
 
-    Signals i, w, th, phi at every tick; w_ref, i_ref and u, before what is injected, at each of their
-    updates.  ``initial`` is (i, w, th).
+    Signals i, w, th, phi and u at every tick.  ``initial`` is (i, w, th).
     """
     control, N, load = design.controller, design.total_ratio, design.load
     Ts, d = control.period_s, control.computing_delay_s
@@ -78,20 +72,19 @@ def run(design, command, torque_Nm=0.0, moment_Nm=0.0, contact=1.0, initial=(0.0
         whole, (size, _) = matrix_balance(whole, permute=False, separate=True)
         E = size[:, None] * expm(whole) / size  # without the balance a stiff one loses seven digits
         pieces.append((E[:5, :5], E[:5, 5:]))
-    plain = Unlimited(design, inject or {})
+    plain = Unlimited(design)
     plain.speed.angles = [initial[2]] * len(plain.speed.angles)
     behind = control.velocity is not None and control.velocity.sensor == "output" and design.coupling
     scale = N if control.outermost == "velocity" else 1.0
     x, past = np.array([*initial, 0.0, initial[2] / design.ratio_to_coupling]), [0.0] * (q + 2)
-    states = np.empty((len(command), 5))
+    states, u = np.empty((len(command), 5)), np.empty(len(command))
     for k, value in enumerate(command):
         states[k] = i, w, th, W, phi = x
         angle = phi / design.ratio_behind_coupling
         seen = design.ratio_to_coupling * W if behind else w
-        past = [plain.at("u", plain.tick(value / scale, i, seen, th, angle), k), *past[:-1]]
-        turning = W / design.ratio_behind_coupling if design.coupling else w / N
+        past = [plain.tick(value / scale, i, seen, th, angle), *past[:-1]]
+        u[k], turning = past[0], W / design.ratio_behind_coupling if design.coupling else w / N
         held = moment_Nm + load.moment_slope_Nm_rad * angle - load.moment_damping_Nms_rad * turning
         for (Phi, Gamma), j in zip(pieces, (q + 1, q), strict=True):
             x = Phi @ x + Gamma @ np.array([past[j], torque_Nm, held])
-    signals = dict(zip(("i", "w", "th", "W", "phi"), states.T, strict=True))
-    return signals | {name: np.array(values) for name, values in plain.values.items()}
+    return dict(zip(("i", "w", "th", "W", "phi"), states.T, strict=True)) | {"u": u}

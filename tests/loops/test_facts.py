@@ -1,12 +1,12 @@
 """What a drive can do, and where its limits begin: closed forms, the simulator, many against one."""
 
+from collections.abc import Callable
 from dataclasses import replace
 from math import inf
 
 import numpy as np
 import pytest
 from loop_designs import amber, controlled, ctms_position, drive_d, drive_e, emps, source_drive, without
-from recursion import run
 from test_stacked import DRIVES, scattered
 
 from actuator_lti import assemble_loops, load_design, onset
@@ -16,8 +16,9 @@ from actuator_lti.design.model import Design, Limits
 from actuator_lti.drive.facts import RATE_LIMITS, Capability, breakaway_torque_Nm, capability, stall_torque_Nm
 from actuator_lti.drive.steady import torque_gain_Nm_rad
 from analyses.specification.capability import drive_figures
-from nonlinear import Drive, commands, simulate
+from nonlinear import commands, simulate
 from tests.changed import changed
+from tests.nonlinear.elastic_drive import stribeck
 from tests.refusals import refused
 
 
@@ -35,28 +36,54 @@ def test_j10_the_breakaway_ratio_acts_on_the_dry_part_only(load: float, starts: 
     assert travelled == pytest.approx(0.5 * expected * run.time_s[-1] ** 2, rel=1e-6, abs=1e-12)
 
 
-def test_a_map_of_friction_bounds_the_speed() -> None:
-    """U = R i + kE w with the map's torque: on its second piece 0.02 + 1e-4 (w - 100)."""
-    rows = ((0.0, 0.05), (100.0, 0.02), (900.0, 0.1))
-    points = tuple(model.FrictionPoint(speed_rad_s=w, torque_Nm=T) for w, T in rows)
-    design = replace(drive_e(), friction=model.Friction(points=points), coupling=None, load=model.Load())
-    capacity = capability(design)
+BEHIND = model.LoadFriction(dry_torque_Nm=3.0, viscous_Nms_rad=0.2, breakaway_ratio=1.5)
+RUBBING = changed(
+    drive_d(), load={"friction": BEHIND},
+    friction={"dry_torque_Nm": 0.01, "viscous_Nms_rad": 1e-5, "breakaway_ratio": 1.2},
+)  # fmt: skip
+POINTS = stribeck((0.0, 0.05), (100.0, 0.02), (900.0, 0.1))
+MAPPED = replace(drive_e(), friction=model.Friction(points=POINTS), coupling=None, load=model.Load())
+BARE = changed(amber(), limits={"speed_rad_s": 1e5, "acceleration_rad_s2": inf, "peak_current_A": 1e3})
+N, C0, CM, CV = 2376.0, 2.25e-3, 1.34e-3, 5.25e-6  # of `amber`, whose resistance is 55 mohm
+
+
+def damped(path: str) -> Design:
+    return changed(BARE, load={"path": path, "moment_damping_Nms_rad": 20.0})
+
+
+AT_THE_BUS = {  # drive and load; resistance of the circuit, and what the motor needs at a speed, by hand
+    "the second piece of a map": (MAPPED, 0.0, 0.5, lambda w: 0.02 + 1e-4 * (w - 100.0)),
+    "friction on both sides": (RUBBING, 0.0, 0.5, lambda w: 0.01 + 3.0 / 10 + (1e-5 + 0.2 / 100) * w),
+    "a supply that sags": (
+        replace(BARE, supply=model.Supply(resistance_ohm=0.04)), 4.0, 0.095, lambda w: C0 + CM * 4.0 + CV * w
+    ),
+    "a damped load": (
+        damped("back-drivable"), 0.0, 0.055, lambda w: C0 + (CV + (1.0 / N + CM) * 20.0 / N) * w
+    ),
+    "a damped load that is held": (
+        damped("self-locking"), 0.0, 0.055, lambda w: C0 + (CV + CM * 20.0 / N) * w
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", AT_THE_BUS)
+def test_the_top_speed_is_where_the_bus_ends(name: str) -> None:
+    """U = R i + kE w with the current that friction and load need; and where a run ends up."""
+    design, load, ohm, needed = AT_THE_BUS[name]
+    motor, capacity = design.effective_motor, capability(design, load)
     w = capacity.output_rate_rad_s * design.total_ratio
-    i = (0.02 + 1e-4 * (w - 100)) / 0.05
-    assert 0.5 * i + 0.05 * w == pytest.approx(48.0, rel=1e-12)
+    i = needed(w) / motor.torque_constant_Nm_A
+    bus = design.limits.voltage_V
+    assert ohm * i + motor.back_emf_constant_Vs_rad * w == pytest.approx(bus, rel=1e-12)
     assert capacity.motor_current_A == pytest.approx(i, rel=1e-12)
     assert RATE_LIMITS[int(capacity.rate_limit)] == "voltage"
+    assert stall_torque_Nm(design) == pytest.approx(motor.torque_constant_Nm_A * bus / ohm)
+    ran = simulate(design, commands.step(1e3), 0.5, -load)
+    assert ran.motor_speed_rad_s[-1] == pytest.approx(w, rel=1e-6)
 
 
-def test_friction_behind_the_coupling_counts() -> None:
-    """Both frictions at the motor: Cv + Cv_l/N_c^2, C0_l/N_c; each dry part held by its own ratio."""
-    behind = model.LoadFriction(dry_torque_Nm=3.0, viscous_Nms_rad=0.2, breakaway_ratio=1.5)
-    friction = model.Friction(dry_torque_Nm=0.01, viscous_Nms_rad=1e-5, breakaway_ratio=1.2)
-    design = replace(drive_d(), friction=friction, load=replace(drive_d().load, friction=behind))
-    assert breakaway_torque_Nm(design, 0.0, 1) == pytest.approx(1.2 * 0.01 + 1.5 * 3.0 / 10)
-    w = capability(design).output_rate_rad_s * 10
-    needed = 0.01 + 0.3 + (1e-5 + 0.2 / 100) * w
-    assert 0.5 * needed / 0.05 + 0.05 * w == pytest.approx(48.0, rel=1e-12)
+def test_each_dry_part_is_held_by_its_own_ratio() -> None:
+    assert breakaway_torque_Nm(RUBBING, 0.0, 1) == pytest.approx(1.2 * 0.01 + 1.5 * 3.0 / 10)
 
 
 def test_the_torque_that_speeds_up_the_load_brings_friction_too() -> None:
@@ -133,38 +160,33 @@ def test_the_speed_command_is_clamped_whoever_gives_it(stages: tuple[str, ...]) 
     assert drive_figures(without(amber(), "velocity", gain=1.0)).rate_limit == "voltage"
 
 
-@pytest.mark.parametrize("load", [0.0, 4.0])
-def test_a_sagging_supply_slows_the_drive(load: float) -> None:
-    """At the voltage limit U_s = (R + R_s) i + kE w: by hand, and where the simulator ends up."""
-    base = amber()
-    design = replace(
-        base, supply=model.Supply(resistance_ohm=0.04), coupling=None,
-        limits=replace(base.limits, speed_rad_s=1e5, acceleration_rad_s2=float("inf"), peak_current_A=1e3),
-    )  # fmt: skip
-    motor, friction = design.motor, design.friction
-    dry = friction.dry_torque_Nm + friction.load_coefficient * load
-    kM, kE = motor.torque_constant_Nm_A, motor.back_emf_constant_Vs_rad
-    total = motor.resistance_ohm + 0.04
-    w = (kM * design.limits.voltage_V / total - dry) / (friction.viscous() + kM * kE / total)
-    assert capability(design, load).output_rate_rad_s * design.total_ratio == pytest.approx(w, rel=1e-12)
-    assert stall_torque_Nm(design) == pytest.approx(kM * design.limits.voltage_V / total)
-    ran = simulate(design, commands.step(1e3), load_Nm=-load, duration_s=0.5)
-    assert ran.motor_speed_rad_s[-1] == pytest.approx(w, rel=1e-6)
+def fin_needs(load_Nm: float) -> Callable[[float], float]:
+    """Motor torque over its speed, of the fin's friction, bearing and load."""
+    felt = 1.7e-3 + 1.0 / 60.0
+    return lambda w: 8e-3 + felt * (load_Nm + 0.05) + (1e-5 + felt * 0.02 / 60.0) * w
 
 
-@pytest.mark.parametrize(("load", "deg_s"), [(0.0, 454.844), (8.0, 423.775)])
-def test_a_p_velocity_loop_stays_below_its_limit_by_its_droop(load: float, deg_s: float) -> None:
-    """The fin: kM (Kp (w_lim - w) - kE w)/R against friction, bearing and load, solved by hand for w."""
-    fin = load_design("fin")
-    torque = 8e-3 + 1.7e-3 * (load + 0.05) + (load + 0.05) / 60.0  # and what grows with w:
-    viscous = 1e-5 + 0.02 / 60.0 * (1.7e-3 + 1.0 / 60.0)
-    w = (0.03 * 0.12 * 600.0 - torque) / (0.03 * (0.12 + 0.03) + viscous)
-    assert np.degrees(w / 60.0) == pytest.approx(deg_s, abs=1e-3)
-    figures = drive_figures(fin, load)
-    assert figures.output_rate_rad_s * 60.0 == pytest.approx(w, rel=1e-12)
+FIN, GAIN = load_design("fin"), 0.02
+PLAIN = controlled(amber(), velocity={"integral_time_s": None}, current={"integral_time_s": None})
+FREE = changed(PLAIN, limits={"peak_current_A": 1e3})
+DROOPING = {  # drive and load; what it pulls with per speed that is missing, resistance, need
+    "a voltage drive": (FIN, 0.0, 0.12, 1.0, fin_needs(0.0)),
+    "under load": (FIN, 8.0, 0.12, 1.0, fin_needs(8.0)),
+    "P of speed and current": (FREE, 0.0, 0.12 * GAIN, 0.055 + GAIN, lambda w: C0 + CV * w),
+}
+
+
+@pytest.mark.parametrize("name", DROOPING)
+def test_a_p_velocity_loop_stays_below_its_limit_by_its_droop(name: str) -> None:
+    """kM (Kp (w_lim - w) - kE w)/R against what friction and load need; and where a run ends up."""
+    design, load, pull, ohm, needed = DROOPING[name]
+    motor, limit, figures = design.effective_motor, design.limits.speed_rad_s, drive_figures(design, load)
+    w = figures.output_rate_rad_s * design.total_ratio
+    volts = pull * (limit - w) - motor.back_emf_constant_Vs_rad * w
+    assert motor.torque_constant_Nm_A * volts / ohm == pytest.approx(needed(w), rel=1e-11)
     assert figures.rate_limit == "speed limit less droop of the P velocity loop"
-    level = replace(fin, load=fin.load.level())
-    ran = simulate(level, commands.ramp(20.0), duration_s=1.0, load_Nm=-load)
+    level = replace(design, load=design.load.level())
+    ran = simulate(level, commands.ramp(20.0), 1.0, -load)
     assert ran.motor_speed_rad_s[-1] == pytest.approx(w, rel=1e-6)
 
 
@@ -175,48 +197,6 @@ def test_an_integral_or_a_drive_without_friction_leaves_no_droop() -> None:
     held = replace(free, friction=model.Friction(dry_torque_Nm=0.01))
     below = held.limits.speed_rad_s - 0.01 / held.motor.torque_constant_Nm_A / held.controller.velocity.gain
     assert capability(held).output_rate_rad_s * held.total_ratio == pytest.approx(below, rel=1e-12)
-
-
-def test_the_droop_of_many_drives_with_p_loops_is_that_of_each() -> None:
-    """Voltage of a P current loop: kp (i_ref - i) = R i + kE w."""
-    design = controlled(amber(), velocity={"integral_time_s": None}, current={"integral_time_s": None})
-    control = design.controller
-    gains = np.array([0.5, 1.0, 2.0]) * control.current.gain_V_A
-    many = capability(stacked(design, {"control.current.gain": gains})).output_rate_rad_s * design.total_ratio
-    motor, friction, kp = design.effective_motor, design.friction, control.velocity.gain
-    for gain, found in zip(gains, many, strict=True):
-        total = gain + motor.resistance_ohm
-        pull, back = motor.torque_constant_Nm_A * gain * kp / total, motor.torque_constant_Nm_A / total
-        slope = pull + back * motor.back_emf_constant_Vs_rad + friction.viscous()
-        w = (pull * design.limits.speed_rad_s - friction.dry_torque_Nm - friction.offset_torque_Nm) / slope
-        assert found == pytest.approx(w, rel=1e-12)
-
-
-def peaks(design: Design, cycles: int, window: int, amplitude: float) -> dict[str, float]:
-    """Steady peaks of u, i_ref and w_ref for a sinusoid at the output shaft, run tick by tick."""
-    record = run(design, amplitude * np.sin(2 * np.pi * cycles / window * np.arange(2 * window)))
-    steady = {
-        name: record[name][-window // every :] for name, every in (("u", 1), ("i_ref", 2), ("w_ref", 10))
-    }
-    steady["change"] = np.diff(record["w_ref"])[-window // 10 :] / 1e-3
-    steady["rate"] = np.diff(record["i_ref"])[-window // 2 :] / 2e-4
-    return {name: float(np.max(np.abs(values))) for name, values in steady.items()}
-
-
-@pytest.mark.parametrize("cycles", [61, 401])
-@pytest.mark.parametrize("feedforward", [0.0, 0.9])
-def test_onset_of_each_limiter_in_the_multirate_drive(cycles: int, feedforward: float) -> None:
-    """At the onset amplitude the largest steady sample is the limit, whichever sub-tick it falls in."""
-    design, window = amber(2, 10, feedforward=feedforward), 14_000
-    design = changed(design, limits={"current_rate_A_s": 1e3})
-    loops, omega = assemble_loops(design), 2 * np.pi * cycles / (window * 1e-4)
-    seen = peaks(design, cycles, window, 1e-3)
-    signals = {"speed": "w_ref", "acceleration": "change", "current": "i_ref", "voltage": "u"}
-    signals["current-rate"] = "rate"
-    for name, path in loops.limiters.items():
-        amplitude = float(path.onset_amplitude_rad(omega)[0])
-        # the recursion sees samples of the sinusoid, whose phases here lie densely enough for 0.1 %
-        assert seen[signals[name]] * amplitude / 1e-3 == pytest.approx(path.limit, rel=2e-3), name
 
 
 def test_speed_clamp_of_a_p_position_loop_with_ideal_inner_loops() -> None:
@@ -295,14 +275,3 @@ def test_a_torque_drive_ramps() -> None:
     assert (run.limits["current-rate"].limit, run.limits["current-rate"].unit) == (2000.0, "A/s")
     free = simulate(replace(design, limits=Limits(voltage_V=1e6)), commands.step(1.0), 0.01)
     assert "current-rate" not in free.limits
-
-
-def test_the_integral_of_a_position_controller_waits() -> None:
-    """PI of position straight on the current: behind the slope limit out is not v, so I is kept."""
-    loop = {"gain": 0.1, "every": 1, "integral_time_s": 1e-3}
-    design = controlled(load_design("ilr33-amber"), velocity=None, position=loop)
-    drive = Drive(replace(design, limits=Limits(voltage_V=1e6, current_rate_A_s=1.0)))
-    for k in range(1, 4):
-        drive.control(1.0, 0.0, 0.0, 0.0)
-        assert drive.value("position_integrator") == 0.0
-        assert drive.value("current_reference") == pytest.approx(1e-4 * k, rel=1e-12)

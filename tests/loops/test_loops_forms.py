@@ -10,7 +10,7 @@ import pytest
 from loop_designs import amber, controlled, ctms_position, emps, faster, response, without
 
 from actuator_lti import DelaySystem, InputError, assemble_loops, stability_margins
-from actuator_lti.design.model import Encoder, Friction, Load
+from actuator_lti.design.model import Design, Encoder, Friction, Load
 from actuator_lti.drive.operating import Operating, slope_at
 from actuator_lti.loops import exact_margins
 from tests.margins.margin_truth import truth_of
@@ -49,27 +49,25 @@ def by_hand(s: np.ndarray, k: float = 0.0, late_i: Any = 1.0, late_w: Any = 1.0)
     return Li, 0.12 * (1 + 1 / (15e-3 * s)) * late_w * Li / (1 + Li) * K * mechanics
 
 
-def test_ideal_loops_are_the_hand_transfer_functions() -> None:
-    loops, s = assemble_loops(amber(), "ideal"), 1j * np.geomspace(0.1, 1e5, 60)
-    Li, Lw = by_hand(s)
-    np.testing.assert_allclose(loops.current.open_loop(s), Li, rtol=1e-10)
-    np.testing.assert_allclose(loops.velocity.open_loop(s), Lw, rtol=1e-9)
-    Lp = 120 * Lw / (1 + Lw) / s
-    np.testing.assert_allclose(loops.position.open_loop(s), Lp, rtol=1e-8)
+@pytest.mark.parametrize(("form", "design", "late"), [
+    ("ideal", amber(), (0.0, 0.0, 0.0)),
+    ("continuous", amber(2, 10, delay_s=1.3e-4), (1.8e-4, 0.5e-4, 4e-4)),
+])  # fmt: skip
+def test_loops_are_the_hand_transfer_functions(form: Any, design: Design, late: tuple[float, ...]) -> None:
+    """Each behind the delays nested in it."""
+    loops, s = assemble_loops(design, form), 1j * np.geomspace(0.1, 1e5, 60)
+    late_i, late_w, late_p = np.exp(-np.outer(late, s))
+    Li, Lw = by_hand(s, 0.0, late_i, late_w)
+    Lp = 120.0 / s * late_p * Lw / (1 + Lw)
+    for loop, wanted in zip(loops.present.values(), (Li, Lw, Lp), strict=True):
+        assert isinstance(loop.open_loop, DelaySystem) == (form == "continuous")
+        np.testing.assert_allclose(loop.open_loop(s), wanted, rtol=1e-8)
+        np.testing.assert_allclose(loop.closed_loop(s), wanted / (1 + wanted), rtol=1e-8)
+        np.testing.assert_allclose(loop.sensitivity(s), 1 / (1 + wanted), rtol=1e-8)
     np.testing.assert_allclose(loops.reference_to_output(s), Lp / (1 + Lp), rtol=1e-8)
     # at i_ref with the position loop closed as well: Cw (1 + Kv/s) T_i K/(J s + Cv)
-    np.testing.assert_allclose(loops.break_points["i_ref"].open_loop(s), Lw * (1 + 120 / s), rtol=1e-8)
-
-
-def test_continuous_loops_keep_the_nested_delays() -> None:
-    loops = assemble_loops(amber(2, 10, delay_s=1.3e-4), "continuous")
-    s = 1j * np.geomspace(0.1, 1e5, 60)
-    _, Lw = by_hand(s, 0.0, np.exp(-s * 1.8e-4), np.exp(-s * 0.5e-4))
-    Lp = 120 / s * np.exp(-s * 4e-4) * Lw / (1 + Lw)
-    assert isinstance(loops.position.open_loop, DelaySystem)
-    np.testing.assert_allclose(loops.position.open_loop(s), Lp, rtol=1e-8)
-    np.testing.assert_allclose(loops.position.closed_loop(s), Lp / (1 + Lp), rtol=1e-8)
-    np.testing.assert_allclose(loops.position.sensitivity(s), 1 / (1 + Lp), rtol=1e-8)
+    at_i = Lw * (1 + 120.0 / s * late_p)
+    np.testing.assert_allclose(loops.break_points["i_ref"].open_loop(s), at_i, rtol=1e-8)
 
 
 @pytest.mark.parametrize("form", FORMS)
@@ -84,16 +82,6 @@ def test_feedforward_is_the_derivative_of_the_command(form: Any) -> None:
     np.testing.assert_allclose(
         response(fed, omega), response(plain, omega) * (1 + 0.9 * rate / 120), rtol=1e-8
     )
-
-
-def test_feedforward_of_a_position_loop_on_a_force_source() -> None:
-    design = without(emps(1e-3), "velocity", gain=2e4)
-    loops = assemble_loops(controlled(design, position={"feedforward": 200.0}), "continuous")
-    omega = np.geomspace(1, 100, 10)
-    s = 1j * omega
-    P = 35.15065 / (s * (95.1089 * s + 203.5034)) * np.exp(-1.5e-3 * s)
-    expected = (2e4 + 200 * (1 - np.exp(-1e-3 * s)) / 1e-3) * P / (1 + 2e4 * P)
-    np.testing.assert_allclose(response(loops.reference_to_output, omega), expected, rtol=1e-9)
 
 
 @pytest.mark.parametrize("form", FORMS)
@@ -250,17 +238,15 @@ def test_sensitivities_sum_to_one_in_every_form(seed: int) -> None:
             assert loop.unit_in == loop.unit_out
 
 
-def test_signals_are_named() -> None:
+def test_signals_are_named_and_printing_says_what_it_is() -> None:
     loops = assemble_loops(amber())
     assert loops.velocity.open_loop.input_labels == ["e_w"]
     assert loops.velocity.open_loop.output_labels == ["w_meas"]
     assert loops.reference_to_output.output_labels == ["output_angle"]
     assert assemble_loops(amber(), "continuous").position.open_loop.input_labels == ["e_th"]
-
-
-def test_printing_says_what_it_is() -> None:
     loops = assemble_loops(amber(2, 10))
     assert repr(loops) == "Loops(amber: current, velocity, position; sampled, sliding, 0 N m, rotor free)"
+    assert "0 N, rotor" in repr(assemble_loops("ballscrew"))
     expected = "Loop(at u, broken at u, in V, every 0.1 ms, fundamental of a periodic loop)"
     assert repr(loops.break_points["u"]) == expected
     assert repr(assemble_loops(amber(), "ideal").velocity).endswith("in rad/s, continuous)")

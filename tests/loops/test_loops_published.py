@@ -13,7 +13,7 @@ from scipy.signal import cont2discrete
 
 from actuator_lti import assemble_loops, load_design, plant
 from actuator_lti.design import Design, shipped_designs, with_overrides
-from actuator_lti.design.model import Friction, Gear, Motor
+from actuator_lti.design.model import Friction, Motor
 from tests.refusals import refused
 
 
@@ -105,13 +105,6 @@ def test_g6_sampled_with_a_stiff_electrical_pole() -> None:
     np.testing.assert_allclose(loop.open_loop(z), (z - 1) / z * total, rtol=1e-9)
 
 
-def test_a_gear_ratio_drops_out_of_the_position_loop() -> None:
-    one, other = amber(), amber(gears=(Gear(name="direct", ratio=1.0),))
-    z = np.exp(1j * np.geomspace(1, 3e4, 20) * 1e-4)
-    theirs, ours = (assemble_loops(design).reference_to_output for design in (one, other))
-    np.testing.assert_allclose(theirs(z), ours(z), rtol=1e-9)
-
-
 W = np.geomspace(1.0, 2e4, 60)
 
 
@@ -156,25 +149,6 @@ def test_a_free_rotor_has_its_back_emf() -> None:
     assert entry(found, "current", "u") == pytest.approx(speed * (p["J"] * s + p["C"]) / p["kM"], rel=1e-11)
     assert entry(found, "output_angle", "u") == pytest.approx(speed / s / design.total_ratio, rel=1e-11)
     assert not np.any(entry(found, "speed", "load_torque"))  # self-locking
-
-
-def test_a_spring_between_two_masses() -> None:
-    """Of a force source: w (J_m s + C + felt/N_c Z) = g u and so on, solved from Newton's two equations."""
-    design = prompt("joint")
-    p, s, coupling = ideal_motor(design), 1j * W, design.coupling
-    N, J_m, J_l = design.ratio_to_coupling, design.motor_side_inertia_kgm2, design.load_side_inertia_kgm2
-    bare = replace(design, load=replace(design.load.bare(), friction=None),
-                   friction=replace(design.friction, load_coefficient=0.0))  # fmt: skip
-    found = plant(bare, "ideal")
-    Z = coupling.stiffness_Nm_rad / s + coupling.damping_Nms_rad  # torque per speed of twist
-    electric = p["kM"] * p["kE"] / (p["L"] * s + p["R"])
-    for source, torque, moment in (("u", p["kM"] / (p["L"] * s + p["R"]), 0.0), ("load_torque", 0.0, 1.0)):
-        # (J_m s + C + electric + Z/N^2) w - Z/N W = torque;  (J_l s + Z) W - Z/N w = moment
-        a, b, d = J_m * s + p["C"] + electric + Z / N**2, -Z / N, J_l * s + Z
-        w, behind = (d * torque - b * moment) / (a * d - b * b), (a * moment - b * torque) / (a * d - b * b)
-        assert entry(found, "speed", source) == pytest.approx(w, rel=1e-9)
-        assert entry(found, "twist", source) == pytest.approx((w / N - behind) / s, rel=1e-9)
-        assert entry(found, "output_angle", source) == pytest.approx(behind / s, rel=1e-9)
 
 
 @pytest.mark.parametrize("name", shipped_designs())

@@ -11,36 +11,15 @@ import pytest
 import scipy.signal
 import tomli_w
 from loop_designs import controlled
-from own_laws import PlainLaw, as_law, drawn, linear, stepped
+from own_laws import PlainLaw, as_law, drawn, linear, same_run, stepped
 
 from actuator_lti import InputError, assemble_loops, load_design, stability_margins
 from actuator_lti.design import Design, design_hash, design_tree, model, warnings_of
 from actuator_lti.design.model import Command, Encoder, Limits, OutputEncoder
 from actuator_lti.loops.assemble import loops_at
-from nonlinear import Drive, Rows, State, commands, simulate, tangent
+from nonlinear import Drive, State, commands, simulate, tangent
 from nonlinear.bench.loop_setup import loop_setup
 from tests.changed import changed
-
-TICKS = 400
-SIGNALS = {"th": "motor_angle_rad", "w": "motor_speed_rad_s", "i": "current_A", "u": "voltage_V"}
-
-
-def same_run(design: Design, case: object, rng: np.random.Generator) -> None:
-    """Simulator without limits and linear map, tick by tick, under a sine, a ramp and a load."""
-    t = np.arange(TICKS)
-    command = 1e-2 * (np.sin(t * rng.uniform(0.01, 0.1)) + 1e-3 * t)
-    rows = Rows.of(design, limits_on=False)
-    rows["ticks"], rows["load"] = TICKS, 0.1
-    rows.series("command", command)
-    system = assemble_loops(design).tick_system
-    with np.errstate(over="ignore", invalid="ignore"):
-        run, linear = rows.trajectory(), system.respond(command, 0.0, None, 0.1)
-    for name, ours in SIGNALS.items():
-        if name not in linear:
-            continue
-        some = np.maximum.accumulate(np.abs(linear["w"])) < 1e12
-        most = np.abs(linear[name][some]).max()
-        assert np.abs(getattr(run, ours) - linear[name])[some].max() <= 1e-9 * most, (case, name)
 
 
 @pytest.mark.parametrize("part", range(4))

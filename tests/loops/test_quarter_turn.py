@@ -67,17 +67,6 @@ def test_a_slope_beside_it_stays() -> None:
     assert (many == 0.0).tolist() == [False, True, False, True]
 
 
-@pytest.mark.parametrize("slope", SLOPES)
-def test_a_weak_spring_behind_a_pi(slope: float) -> None:
-    """T(0) = L0/(1 + L0) with L0 = Kp/Tn kM/k, however weak the spring."""
-    design = sprung("ilr33-amber", slope, gravity=None)
-    law, N = design.controller.velocity, design.total_ratio
-    L0 = law.gain / law.integral_time_s * design.effective_motor.torque_constant_Nm_A * N**2 / -slope
-    band = closed_loop_bandwidth(assemble_loops(design).velocity.closed_loop)
-    assert 0.0 < band.resonance_peak_db < 2.0
-    assert band.dc_gain == pytest.approx(L0 / (1 + L0), rel=1e-9)
-
-
 @pytest.mark.parametrize(("followed", "told"), [(0.2, True), (0.7, True), (0.72, False), (0.95, False)])
 def test_a_spring_that_holds_3_db_of_a_constant_command_is_told(followed: float, told: bool) -> None:
     """k = (1/T(0) - 1) Kp/Tn kM N^2; 1/sqrt(2) lies between 0.7 and 0.72."""

@@ -3,13 +3,11 @@
 from dataclasses import replace
 from math import inf, pi, sqrt
 
-import control
 import numpy as np
 import pytest
-from loop_designs import amber, controlled, drive_d, emps
-from own_laws import linear
+from loop_designs import drive_d, emps
+from own_laws import laid_bare
 from recursion import run
-from test_stacked import FILTERS, everything
 
 from actuator_lti import assemble_loops
 from actuator_lti.design import load_design, model, with_values
@@ -20,13 +18,11 @@ from actuator_lti.loops.tick import Block, mean_response
 from actuator_lti.systems.resolvent import responses
 from analyses.linear.loop_figures import all_loop_figures
 from nonlinear.bench.operating_motion import on_its_stand, on_the_bench
-from tests.changed import changed
 from tests.validation.random_drives import full_drive
 from tests.validation.rich_drives import rich_drive
 
 UNITS = {"position": 1.0, "velocity": 30.0, "current": 2.0, "voltage": 1.0}
 CONTACTS = {"driving": 1.0, "driven": -1.0}
-TICK = 1e-4
 
 
 def worst(ours: np.ndarray, theirs: np.ndarray, beside: float = 0.0) -> float:
@@ -54,8 +50,6 @@ def agree(design: model.Design, ticks: int, tolerance: float, point: str = "slid
 OPEN = replace(drive_d(), controller=model.Controller(period_s=1e-4, computing_delay_s=1.5e-4))
 MOVED = {"torque": -20.0, "start": (0.0, 0.02, 0.001)}
 KINDS = {"open-loop voltage": (OPEN, {}), "force source": (emps(delay_s=5e-4), MOVED)}
-RATES = ((1, 1), (2, 10))
-FILTERED = ("filter_time_s", "filter_order", "filter_damping")
 
 
 @pytest.mark.parametrize("name", KINDS)
@@ -64,69 +58,12 @@ def test_drives_that_are_not_drawn(name: str) -> None:
     agree(design, 4000, 1e-9, **moved)
 
 
-def laid_bare(design: model.Design) -> model.Design:
-    """The linear part of a drive: of its command the filter, of its friction what grows with the load."""
-    command, motor = design.command, replace(design.effective_motor, constants="dc", cogging_Nm=0.0)
-    kept = replace(model.Command(), **{name: getattr(command, name) for name in FILTERED})
-    bare = replace(linear(design), motor=motor, temperature=model.Temperature(), command=kept)
-    line = dict.fromkeys(("torque_1_Nm", "stiffness_2_Nm_rad", "torque_2_Nm", "stiffness_3_Nm_rad"))
-    return changed(
-        bare, friction={"load_coefficient": design.friction.load_coefficient}, load={"gear_error_Nm": 0.0},
-        encoder=replace(design.encoder, counts_per_rev=None), coupling=bare.coupling and line,
-    )  # fmt: skip
-
-
 @pytest.mark.parametrize("seed", range(48))
 def test_any_drive_from_any_start_driving_and_driven(seed: int) -> None:
     """Any stage outermost, any plant, delay and speed estimate, any slot of the controller, over decades."""
     design = laid_bare(rich_drive(seed, own_law=False))
     for point in CONTACTS if design.coupling is not None else ("sliding",):
         agree(design, 120, 1e-9, point, torque=-2.25e-3, start=(0.5, 40.0, 0.0))
-
-
-def test_the_gate_has_teeth() -> None:
-    """A notch moved by 0.1 %, or 1 % of a tick of delay more, is far outside the tolerance."""
-    design = everything()
-    assert design.controller.velocity.filters == FILTERS
-    moved = replace(FILTERS[1], frequency_rad_s=900.9)
-    other = controlled(design, velocity={"filters": (FILTERS[0], moved, *FILTERS[2:])})
-    late = controlled(amber(), computing_delay_s=1.01e-4)
-    command = 0.1 * np.sin(np.arange(2000) / 40)
-    for base, beside in ((design, other), (amber(), late)):
-        ours = assemble_loops(base).tick_system.respond(command)["u"]
-        assert worst(ours, run(beside, command)["u"]) > 1e-6
-
-
-@pytest.mark.parametrize("rates", RATES)
-def test_lifted_system_in_forced_response(rates: tuple[int, int]) -> None:
-    system = assemble_loops(amber(*rates, delay_s=1.5e-4)).tick_system
-    steps = 2000 // rates[1]
-    command, torque = np.repeat(0.01 * np.sin(np.arange(steps) / 20), rates[1]), -1e-3
-    direct, lifted = system.respond(command, torque), system.lifted()
-    inputs = np.vstack([command[:: rates[1]], np.full(steps, torque), np.zeros(steps)])
-    answer = control.forced_response(lifted, np.arange(steps) * lifted.dt, inputs)
-    stacked = answer.outputs.reshape(rates[1], len(system.outputs), steps).transpose(2, 0, 1)
-    for r, name in enumerate(system.outputs):
-        assert worst(stacked[:, :, r].reshape(-1), direct[name]) < 1e-11
-
-
-@pytest.mark.parametrize(("point", "every"), [("u", 1), ("i_ref", 2), ("w_ref", 10)])
-def test_a_response_analyser_on_the_multirate_drive_sees_the_break_point_loop(point: str, every: int) -> None:
-    """Inject a sinusoid into the running cascade; fundamentals before and after give L = -before/after."""
-    design, window = amber(2, 10, delay_s=1.5e-4), 2000
-    loop = assemble_loops(design).break_points[point]
-    assert loop.periodic == (every < 10)
-    assert loop.period_s == pytest.approx(every * TICK)
-    for cycles in (3, 17, 40) if point == "w_ref" else (3, 40, 130, 331):
-        omega = 2 * np.pi * cycles / (window * TICK)
-        d = np.cos(omega * TICK * np.arange(4 * window))
-        record = run(design, np.zeros(4 * window), inject={point: d})[point]
-        z = np.exp(1j * omega * every * TICK)
-        turns = z ** -np.arange(window // every)
-        before, at_point = (np.sum(each[-window // every :] * turns) for each in (record, d[::every]))
-        after = before + at_point
-        assert loop.open_loop(z) == pytest.approx(-before / after, rel=1e-6)
-        assert loop.sensitivity(z) == pytest.approx(after / at_point, rel=1e-6)
 
 
 SYSTEMS = [  # of one state, by turns

@@ -26,6 +26,7 @@ from tests.validation.random_drives import full_drive
 
 TICK = 1e-4
 SLOPES = (-6000.0, -100.0, -0.1, 50.0)
+WEAK = (-1e-14, -1e-10, -1e-6, -1e-2, 1e-14, 1e-10, 1e-6)
 CURRENT = {"current": model.CurrentLoop(gain_V_A=0.5, integral_time_s=1e-3)}
 
 
@@ -36,7 +37,7 @@ def at_rest(design: Any) -> float:
     return law.gain / law.integral_time_s * motor.torque_constant_Nm_A / stiffness
 
 
-@pytest.mark.parametrize("slope", SLOPES)
+@pytest.mark.parametrize("slope", [*SLOPES, *WEAK])
 @pytest.mark.parametrize("form", ["sampled", "ideal", "continuous"])
 def test_the_velocity_loop_has_the_gain_at_zero_that_the_spring_gives(form: Any, slope: float) -> None:
     design = sprung("ilr33-amber", slope)
@@ -50,24 +51,12 @@ def test_the_velocity_loop_has_the_gain_at_zero_that_the_spring_gives(form: Any,
     upper = [g.db for g in m.gain_margins if g.frequency_rad_s > 0.0]
     assert upper == pytest.approx([g.db for g in bare.gain_margins if g.frequency_rad_s > 0.0], abs=0.01)
     lower = [g.ratio for g in m.gain_margins if g.frequency_rad_s == 0.0]
-    assert lower == pytest.approx([-1.0 / L0] if L0 < 0.0 else [])
+    assert lower == pytest.approx([-1.0 / L0] if -1e10 < L0 < 0.0 else [])  # none beyond 200 dB is listed
     width = closed_loop_bandwidth(loop.closed_loop)
     assert width.dc_gain == pytest.approx(L0 / (1.0 + L0), rel=1e-6)
     assert 0.0 < width.resonance_peak_db < 2.0
     if form != "continuous":
         assert step_figures(loop.closed_loop).final_value == pytest.approx(L0 / (1.0 + L0), rel=1e-6)
-
-
-@pytest.mark.parametrize("name", ["ilr33-amber", "ballscrew", "ilr33-amber-multirate"])
-@pytest.mark.parametrize("slope", SLOPES)
-def test_what_is_taken_out_leaves_the_response_as_it_is(name: str, slope: float) -> None:
-    design = sprung(name, slope)
-    whole = fundamental(stage_blocks(wire(design, Operating()), "velocity"))
-    shown = whole.shown()
-    assert len(shown.states) == len(whole.states) - 1
-    for x in np.exp(1j * np.array([1e-3, 0.03, 0.5, 3.0])):
-        before, after = (b.C @ np.linalg.solve(x * np.eye(len(b.A)) - b.A, b.B) for b in (whole, shown))
-        assert after[0, 0] == pytest.approx(before[0, 0], rel=1e-9)
 
 
 @pytest.mark.parametrize("seed", [90_004, 90_006, 1_301_202])

@@ -137,14 +137,6 @@ def test_a_drive_that_creeps_for_hours_has_a_stiffness_and_one_without_position_
     assert drive_figure(free, "static_stiffness") == 0.0
 
 
-def test_lost_motion_is_a_requirement() -> None:
-    """The fin has 1.5 mrad of play and 2 * 0.36/800 rad of twist."""
-    lost = Requirement(id="lost", quantity="lost_motion", unit="deg", maximum=0.2, load_Nm=8.0)
-    (result,) = evaluate_requirements(replace(load_design("fin"), requirements=(lost,)))
-    assert result.value == pytest.approx(np.degrees(1.5e-3 + 2 * 0.36 / 800.0), rel=1e-12)
-    assert result.verdict == "met"
-
-
 @pytest.mark.parametrize("load_Nm", [0.0, 1.0, 6.0])
 @pytest.mark.parametrize(("margin", "moves"), [(0.98, False), (1.02, True)])
 def test_the_simulator_starts_above_one(load_Nm: float, margin: float, moves: bool) -> None:

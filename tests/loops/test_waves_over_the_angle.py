@@ -2,7 +2,7 @@
 
 import re
 from dataclasses import dataclass, replace
-from math import acos, asin, cos, exp, pi, sin, sqrt
+from math import asin, cos, pi, sin, sqrt
 
 import numpy as np
 import pytest
@@ -13,7 +13,7 @@ from actuator_lti.asked.verdict import Verdict
 from actuator_lti.design import model, read_design_text
 from actuator_lti.design.plant import reachable_speed
 from actuator_lti.drive.facts import breakaway_torque_Nm, capability
-from actuator_lti.drive.operating import Operating, follows_angle, holding_torque_Nm, level, straight
+from actuator_lti.drive.operating import Operating, follows_angle, level, straight
 from actuator_lti.drive.wiring import wire
 from actuator_lti.loops.assemble import loops_at
 from actuator_lti.loops.tick import Tick, TickProgram
@@ -68,29 +68,6 @@ def tick(design: model.Design, **at: object) -> Tick:
 
 
 @each
-def test_a_rotor_swings_as_the_held_recursion_does(case: Case) -> None:
-    """Without friction, its torque held over each tick."""
-    angle, speed, angles = case.stable + 0.9 / case.order, 0.0, []
-    run = simulate(case.put(rotor()), commands.hold(), 0.1, initial=State(motor_angle_rad=angle))
-    for _ in range(1000):
-        angles.append(angle)
-        rate = case.torque(angle) / J
-        angle, speed = angle + speed * Ts + 0.5 * rate * Ts**2, speed + rate * Ts
-    assert run.motor_angle_rad == pytest.approx(np.array(angles), rel=1e-11)
-
-
-@each
-def test_small_swings_about_rest_have_the_frequency_of_the_slope(case: Case) -> None:
-    """omega = sqrt(A Z/J); held over the tick, x = (A Z/J) Ts^2/2: poles of trace 2 - x and product 1 + x."""
-    design, x = case.put(rotor()), A * case.order / J * Ts**2 / 2.0
-    growth, turn = sqrt(1.0 + x), acos((1.0 - 0.5 * x) / sqrt(1.0 + x))
-    assert turn / Ts == pytest.approx(sqrt(A * case.order / J), rel=1e-3)
-    poles = np.linalg.eigvals(tick(design, angle_rad=case.stable / N).A)
-    assert np.max(np.abs(poles)) == pytest.approx(growth, rel=1e-12)
-    assert np.max(np.angle(poles)) == pytest.approx(turn, rel=1e-9)
-
-
-@each
 def test_at_every_instant_it_is_a_spring_that_keeps_its_energy(case: Case) -> None:
     """As in the motor: poles exp(+-j omega Ts), omega = sqrt(A Z/J)."""
     poles = np.linalg.eigvals(tick(case.put(rotor()), angle_rad=case.stable / N, torques_at_once=True).A)
@@ -135,16 +112,6 @@ def test_the_drive_must_get_over_its_peak(case: Case) -> None:
     assert breakaway_torque_Nm(design, 0.0, 1) == pytest.approx(3e-3 + A, rel=1e-12)
     assert capability(design).torque_margin == pytest.approx(10.0 / (3e-3 + A), rel=1e-12)
     assert capability(design).output_rate_rad_s == capability(dry).output_rate_rad_s
-
-
-@each
-@pytest.mark.parametrize("name", ["ilr33-amber", "ilr33-amber-tanh", "joint", "ilr33-amber-compliant"])
-def test_energy_balances(case: Case, name: str) -> None:
-    design = case.put(load_design(name))
-    run = simulate(design, commands.sine(amplitude_rad=0.05, frequency_hz=3.0), 0.3, energy=True)
-    without = simulate(load_design(name), commands.sine(amplitude_rad=0.05, frequency_hz=3.0), 0.3)
-    assert np.max(np.abs(run.current_A - without.current_A)) > 1e-4
-    assert run.energy.relative_error < 1e-9
 
 
 @pytest.mark.parametrize("name", ["load.gear_error", "motor.cogging"])
@@ -201,17 +168,6 @@ def test_a_self_locking_drive_feels_its_cogging() -> None:
     assert run.motor_angle_rad[-1] == pytest.approx(CASES[1].stable + asin(0.5) / 12.0, rel=1e-6)
 
 
-def test_behind_a_coupling_the_motor_stands_where_its_twist_puts_it() -> None:
-    """The slope is that at N angle + N_c twist, and the holding torque is that of the same angle."""
-    design = CASES[1].put(load_design("ilr33-amber-compliant"))
-    at = Operating(angle_rad=0.01, twist_rad=2e-3)
-    angle = design.total_ratio * 0.01 + design.ratio_to_coupling * 2e-3
-    assert wire(design, at).plant.torque["th"] == pytest.approx(
-        12.0 * A * cos(12.0 * angle + PHASE), rel=1e-12
-    )
-    assert holding_torque_Nm(design, 0.01, 2e-3) == pytest.approx(-CASES[1].torque(angle), rel=1e-12)
-
-
 @each
 @pytest.mark.parametrize("name", ["joint", "ilr33-amber-compliant", "fin"])
 def test_a_drive_that_stands_stays_and_takes_the_slope_of_where_it_stands(case: Case, name: str) -> None:
@@ -238,32 +194,12 @@ def test_a_drive_that_stands_stays_and_takes_the_slope_of_where_it_stands(case: 
     assert np.max(np.abs(seen - expected)) < 1e-6 * np.max(np.abs(expected))
 
 
-def ratio(viscous: float, slope: float) -> float:
-    """w_(k+1)/w_k under the torque -slope w_k, held over a tick, and viscous friction."""
-    if viscous == 0.0:
-        return 1.0 - slope * Ts / J
-    kept = exp(-viscous * Ts / J)
-    return kept - (1.0 - kept) * slope / viscous
-
-
-@pytest.mark.parametrize("viscous", [0.0, 1e-3])
-def test_a_rotor_coasts_to_the_held_recursion(viscous: float) -> None:
-    design, expected = rotor(viscous, damping=D), ratio(viscous, D / N**2)
-    run = simulate(design, commands.hold(), 50 * Ts, initial=State(motor_speed_rad_s=-80.0))
-    w = run.motor_speed_rad_s
-    assert w == pytest.approx(-80.0 * expected ** np.arange(w.size), rel=1e-12)
-    assert run.load_Nm == pytest.approx(-D * w / N, rel=1e-12)
-    assert np.sort(np.linalg.eigvals(tick(design).A).real) == pytest.approx(
-        sorted([expected, 1.0]), rel=1e-12
-    )
-
-
 def test_a_self_locking_path_feels_it_as_friction_alone() -> None:
     """T_f = CM |M_ext| = CM D w/N while the load is that moment only."""
     design = rotor(0.0, 2.0 / N, "self-locking", D)
     run = simulate(design, commands.hold(), 50 * Ts, initial=State(motor_speed_rad_s=80.0))
     w = run.motor_speed_rad_s
-    assert w == pytest.approx(80.0 * ratio(0.0, 2.0 * D / N**2) ** np.arange(w.size), rel=1e-12)
+    assert w == pytest.approx(80.0 * (1.0 - 2.0 * D / N**2 * Ts / J) ** np.arange(w.size), rel=1e-12)
     assert wire(design).plant.moment == {}
 
 
@@ -275,21 +211,6 @@ def test_energy_of_the_moment_is_work_on_the_load() -> None:
     assert energy.output_work_J == pytest.approx(0.5 * J * (80.0**2 - after[-1] ** 2), rel=1e-12)
     travel = 0.5 * (after[1:] + after[:-1]) * Ts  # under a constant torque
     assert energy.output_work_J == pytest.approx(float(np.sum(D * w / N**2 * travel)), rel=1e-9)
-
-
-@pytest.mark.parametrize("path", ["back-drivable", "self-locking"])
-def test_top_speed_is_that_of_the_run(path: str) -> None:
-    """(kM U/R - C0) over kM kE/R + Cv + (1/N + CM) D/N, or CM D/N where the path locks itself."""
-    damped = changed(load_design("ilr33-amber"), load={"path": path, "moment_damping_Nms_rad": 20.0})
-    design = controlled(damped, position=None, velocity=None, current=None)
-    motor, friction, N = design.effective_motor, design.friction, design.total_ratio
-    per_volt = motor.torque_constant_Nm_A / motor.resistance_ohm
-    passed = friction.load_coefficient + (1.0 / N if path == "back-drivable" else 0.0)
-    slope = per_volt * motor.back_emf_constant_Vs_rad + friction.viscous_Nms_rad + passed * 20.0 / N
-    expected = (per_volt * design.limits.voltage_V - friction.dry_torque_Nm) / slope / N
-    assert capability(design).output_rate_rad_s == pytest.approx(expected, rel=1e-12)
-    run = simulate(design, commands.step(design.limits.voltage_V), 0.5)
-    assert run.motor_speed_rad_s[-1] / N == pytest.approx(expected, rel=1e-9)
 
 
 def test_cogging_is_blamed_for_the_loops_alone_that_are_stable_without_it(cli) -> None:

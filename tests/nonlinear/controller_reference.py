@@ -208,10 +208,6 @@ class Controller:
             return out
         return self.limit_outer(direct + self.I)
 
-    def at(self, point: str, value: float, k: int) -> float:
-        """What leaves a stage at a tick: for who adds to it."""
-        return value
-
     def torque_gain(self) -> float:
         m = self.design.effective_motor
         if m.source_gain_Nm_V is not None:
@@ -244,7 +240,7 @@ class Controller:
             else:
                 out = self.limit_outer(self.design.total_ratio * r if c.velocity else r)
             if c.velocity:
-                self.w_ref = self.at("w_ref", out, self.k)
+                self.w_ref = out
             elif c.current:
                 self.i_ref = out
             else:
@@ -255,7 +251,7 @@ class Controller:
             out = self.pi_v(self.w_ref - self.w_meas, self.i_ff, limit)
             out = clamp(chained(self.torque, out), limit)
             if c.current:
-                self.i_ref = self.slope(self.at("i_ref", out, self.k), self.n_v)
+                self.i_ref = self.slope(out, self.n_v)
             else:
                 self.u = out
         if self.pi_c:

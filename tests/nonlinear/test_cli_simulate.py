@@ -235,9 +235,7 @@ def test_words_have_the_unit(stages: tuple[str, ...], unit: str, tmp_path, cli) 
     (VOLTAGE, "--amplitude 6 --duration 0.3", 1e-9),
     (CURRENT, "--amplitude 1 --duration 0.3", 1e-9),
     (SPEED, "--amplitude 20 --duration 0.3", 1e-9),
-    ("ilr33-amber", "--command step --amplitude 1 --duration 10", 1e-9),
     ("ballscrew", "--command chirp --amplitude 1 --duration 0.5", 1e-9),
-    ("joint", "--command step --amplitude 1 --duration 0.5", 1e-9),
     ("emps", "--command step --amplitude 1 --duration 0.3", 1e-9),
     # a drive with friction that a load makes: without its load the record would not be met
     ("ilr33-amber", "--command multisine --frequency 2 --to 6 --count 3 --load 1 --amplitude 0.5 "

@@ -18,7 +18,6 @@ K, J_M, J_L, N, B = 200.0, 2e-5, 1e-3, 10.0, 0.01
 REDUCED = 1.0 / (1.0 / J_L + 1.0 / (J_M * N * N))  # inertia of the relative motion
 RESONANCE = np.sqrt(K / REDUCED)
 IDEAL = {"damping_Nms_rad": 0.0}
-TIGHT = IDEAL | {"play_rad": 0.0}
 
 
 def test_reference_number_k5() -> None:
@@ -39,26 +38,6 @@ def test_reference_number_k5() -> None:
 
 def twist_of(run: Run) -> np.ndarray:
     return run.states[:, 3] / N - run.states[:, 4]
-
-
-def test_free_vibrations_of_both_masses_of_the_motor_and_of_the_load() -> None:
-    design, ticks = two_mass(1e-3, source=True, coupling=TIGHT), np.arange(201)
-    run = run_plant(design, np.zeros(200), start=(0.0, 0.0, 0.0, 0.5, 0.0))
-    np.testing.assert_allclose(twist_of(run), 0.05 * np.cos(RESONANCE * ticks * 1e-3), atol=1e-13)
-    common = J_M * N * run.states[:, 3] + J_L * run.states[:, 4]
-    np.testing.assert_allclose(common, common[0], rtol=1e-13)
-    # the load sticks
-    design = two_mass(1e-3, source=True, coupling=TIGHT, load_friction={"dry_torque_Nm": 50.0})
-    run = run_plant(design, np.zeros(100), start=(0.0, 0.0, 0.0, 0.2, 0.0))
-    w0 = np.sqrt(K / (J_M * N * N))
-    np.testing.assert_allclose(run.states[:, 3], 0.2 * np.cos(w0 * np.arange(101) * 1e-3), atol=1e-12)
-    assert not run.states[:, 4].any()
-    # behind a self-locking stage
-    design = two_mass(1e-3, coupling=TIGHT, path="self-locking", friction={"load_coefficient": 0.2})
-    run = run_plant(design, np.zeros(100), start=(0.0, 0.0, 0.0, 0.0, 0.02))
-    swing = 0.02 * np.cos(np.sqrt(K / J_L) * np.arange(101) * 1e-3)
-    np.testing.assert_allclose(run.states[:, 4], swing, atol=1e-13)
-    assert np.abs(run.states[:, 3]).max() < 1e-18
 
 
 def bounce(t: np.ndarray, v: float) -> np.ndarray:

@@ -167,15 +167,6 @@ def test_h2_pure_acceleration_limit_and_h3_an_unsteady_point_shows() -> None:
     assert late < 1e-6
 
 
-def test_voltage_saturation_leaves_no_windup() -> None:
-    """A step on 3 V of supply: saturated half of the way, no more overshoot than the braking costs."""
-    run = simulate(changed(AMBER, limits={"voltage_V": 3.0}), commands.step(0.1), 1.0)
-    assert run.limits["voltage"].fraction > 0.2
-    assert np.abs(run.voltage_V).max() <= 3.0
-    assert run.output_angle_rad.max() < 0.1 * 1.01
-    assert run.output_angle_rad[-1] == pytest.approx(0.1, rel=1e-3)
-
-
 def drive(seed: int) -> Design:
     """Any stages and features over decades; one in four on an ideal torque source, which has no current."""
     design = rich_drive(600 + seed)
@@ -221,7 +212,7 @@ def test_any_drive(part: int) -> None:
             allowed = limits.acceleration_rad_s2 * updates * c.period_s
             assert np.abs(np.diff(run.speed_command_rad_s)).max() <= allowed * (1 + 1e-9), seed
         assert run.events_per_tick <= 50, seed
-        assert design.friction.law == "tanh" or run.energy.relative_error < 1e-9, seed
+        assert run.energy.relative_error < (1e-6 if design.friction.law == "tanh" else 1e-9), seed
     assert tried > 25
 
 

@@ -25,13 +25,17 @@ def torque_drive(gain: float, integral_time_s: float | None, **limits: float) ->
     return changed(TORQUE, controller={"current": current}, limits=model.Limits(**limits))
 
 
-def test_slope_gravity_series_and_constant_act_together_and_are_held() -> None:
-    """Every tick integrated afresh with the moment of its beginning."""
+def test_all_that_goes_with_angle_and_speed_acts_together_and_is_held() -> None:
+    """Slope, gravity, gear error, damping, series, constant, cogging: a tick integrated afresh with those of
+    its beginning."""
     ticks, Ts = 200, AMBER.controller.period_s
     gravity = model.Gravity(mass_kg=3.0, arm_m=0.4, offset_rad=0.7)
     load = {"path": "back-drivable", "moment_slope_Nm_rad": -300.0, "gravity": gravity}
+    load |= {"gear_error_Nm": 9.0, "gear_error_periods": 50.0, "gear_error_phase_rad": 2.5}
+    motor = {"cogging_Nm": 4e-3, "cogging_periods": 12.0, "cogging_phase_rad": 1.0}
+    load |= {"moment_damping_Nms_rad": 300.0}
     unlimited, at_once = model.Limits(voltage_V=1e9), {"computing_delay_s": 0.0}
-    design = changed(AMBER, load=load, friction=FREE, limits=unlimited, controller=at_once)
+    design = changed(AMBER, load=load, motor=motor, friction=FREE, limits=unlimited, controller=at_once)
     u, t = 6.0 * np.sin(0.02 * np.arange(ticks)), np.arange(ticks) * Ts
     series = 20.0 * np.sin(300.0 * t)
     given = replace(loads.series(t, series), constant_Nm=5.0, slope_Nm_rad=100.0)
@@ -43,10 +47,12 @@ def test_slope_gravity_series_and_constant_act_together_and_are_held() -> None:
         result[k] = x
         y = x[2] / N
         M = 5.0 - 200.0 * y + series[k] + 3.0 * 0.4 * 9.80665 * np.sin(y + 0.7)
+        M += 9.0 * np.sin(50.0 * y + 2.5) - 300.0 * x[1] / N
+        held = M / N + 4e-3 * np.sin(12.0 * x[2] + 1.0)
 
-        def rate(_: float, x: np.ndarray, M: float = M, u: float = u[k]) -> list[float]:
+        def rate(_: float, x: np.ndarray, held: float = held, u: float = u[k]) -> list[float]:
             di = (u - m.resistance_ohm * x[0] - m.back_emf_constant_Vs_rad * x[1]) / m.inductance_H
-            return [di, (m.torque_constant_Nm_A * x[0] - 1e-6 * x[1] + M / N) / J, x[1]]
+            return [di, (m.torque_constant_Nm_A * x[0] - 1e-6 * x[1] + held) / J, x[1]]
 
         x = solve_ivp(rate, (0.0, Ts), x, "DOP853", rtol=1e-12, atol=1e-13).y[:, -1]
     for k, values in enumerate((run.current_A, run.motor_speed_rad_s, run.motor_angle_rad)):

@@ -194,3 +194,9 @@ def test_a_requirement_that_needs_a_simulation_of_its_own_is_named() -> None:
     limits = (Requirement(id="swing", quantity="limit_cycle", unit="deg", maximum=0.1),)
     model = live_model(replace(AMBER, requirements=limits))
     assert (model["apart"], model["requirements"]) == ([{"id": "swing", "words": "swing after a step"}], [])
+
+
+def test_a_speed_is_commanded_in_the_unit_of_simulate() -> None:
+    """It was rad/s beside deg/s, of the same command at the output."""
+    step = live_model(replace(AMBER, controller=replace(AMBER.controller, position=None)))["step"]
+    assert (step["of"], step["unit"], step["factor"]) == ("speed", "deg/s", pytest.approx(np.pi / 180.0))

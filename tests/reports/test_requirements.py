@@ -31,7 +31,7 @@ from analyses.stiffness import stiffness
 from reports import document as doc
 from reports.sections.duty import section as duty_section
 from reports.sections.failures import section as failures_section
-from reports.sections.requirements import item, table
+from reports.sections.requirements import item, result, table
 from reports.sections.stiffness import section as stiffness_section
 from reports.terminal import verdict_table
 
@@ -209,8 +209,14 @@ def test_a_figure_that_there_is_not_says_why(name: str, quantity: str, reason: s
     asked = replace(load_design(name), requirements=(requirement(quantity, maximum=1.0),))
     (found,) = evaluate_requirements(asked)
     assert (found.verdict, found.reason) == ("not proven", reason)
-    for block in (*table([found], "N m"), verdict_table(doc.verdicts([item(found)]))):
+    for block in (*table([found]), verdict_table(doc.verdicts([item(found)]))):
         assert f"not proven ({reason})" in str(block["rows"])
+
+
+def test_a_load_on_a_linear_axis_is_told_in_newtons() -> None:
+    asked = replace(requirement("output_rate", minimum=9.0), load_Nm=800.0)
+    verdicts = evaluate_requirements(replace(load_design("ballscrew"), requirements=(asked,)))
+    assert result(verdicts).endswith("Not met: Drive: output rate at 800 N.")
 
 
 def test_a_study_of_many_designs_leaves_them_out_and_says_so(tmp_path) -> None:

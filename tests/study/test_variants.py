@@ -15,11 +15,9 @@ from analyses.specification.capability import drive_figures
 from analyses.specification.requirements import evaluate_requirements
 from analyses.specification.sensitivity import sensitivities
 from analyses.studies.study import Study, Variant, load_study, study_of, study_or_design
-from reports import document as doc
 from reports.sections.compare import batches, brief, ledger, section
 from reports.sections.compare_best import section as best_section
 from reports.sections.compare_figures import tornadoes
-from reports.terminal import print_blocks
 from reports.verdict_summary import walk
 from tests.changed import changed
 from tests.refusals import refused
@@ -139,6 +137,10 @@ def test_variants_differ_by_what_was_changed_and_by_nothing_else(compared):
     shares = {p.path: p.amount for p in both.moved_by["position.phase_margin"]}
     alone = compared.variants[1].differences["position.phase_margin"]
     assert shares["control.velocity.gain"] == pytest.approx(alone, rel=1e-6)
+    tables = [block for part in section(compared) for block in walk(part) if block["kind"] == "table"]
+    shown = {cell for one in tables for row in one["rows"] for key, cell in row.items() if key == "unit"}
+    assert {"N m/rad", "deg/s", ""} <= shown
+    assert not any("*" in unit or "^" in unit for unit in shown)  # as everywhere else
     ends = {name.key: compared.ends(name) for name in compared.names}
     best, worst = ends["velocity.gain_margin"]
     assert best > worst
@@ -271,22 +273,6 @@ def test_a_requirement_at_a_load_in_newtons_is_not_that_at_one_in_newton_metres(
                          ("ilr33-amber", {}), ("ballscrew", {}))
     )  # fmt: skip
     assert (turning == sliding, free[0] == free[1]) == (False, True)
-
-
-def test_columns_that_do_not_fit_stand_in_several_tables(capsys, monkeypatch) -> None:
-    """Four variants named by their keys made a paragraph of each row."""
-    monkeypatch.setenv("COLUMNS", "80")
-    rows = [
-        {"figure": f"loop {k}", "unit": "dB", **{f"d{j}": 10.0 * k + j for j in range(5)}} for k in range(3)
-    ]
-    columns = [doc.column("figure", "Figure"), doc.column("unit", "Unit")]
-    columns += [doc.column(f"d{j}", f"control.position.gain={j}", align="right") for j in range(5)]
-    print_blocks([{**doc.table("Loops", columns, rows), "heads": 2}])
-    lines = capsys.readouterr().out.splitlines()
-    assert [line.strip() for line in lines if "Loops" in line] == ["Loops", *["Loops, continued"] * 2]
-    assert sum(line.startswith(" Figure") for line in lines) == sum("loop 0" in line for line in lines) == 3
-    shown = [float(word) for line in lines if "loop 2" in line for word in line.split()[3:]]
-    assert shown == [20.0, 21.0, 22.0, 23.0, 24.0]
 
 
 def test_the_page_escapes_names_and_has_every_figure(cli, tmp_path):

@@ -160,14 +160,6 @@ def test_friction_keeps_an_unstable_loop_quiet_up_to_the_foreseen_amplitude(load
     assert item.frequency_hz == pytest.approx(item.cycle.frequency_hz, rel=0.08)
 
 
-def test_the_foreseen_amplitude_grows_with_friction() -> None:
-    """The slope 4 Tc/(pi W) at the border is the same, so W goes with Tc."""
-    design = with_values(AMBER, {"control.velocity.gain": 3.0})
-    small, large = (limit_cycles(design, load).confirmations[0].cycle.inner_rad for load in (0.0, 8.0))
-    friction = design.friction
-    assert large / small == pytest.approx(friction.dry_Nm(8.0) / friction.dry_Nm(0.0), rel=1e-9)
-
-
 @pytest.mark.parametrize("integral_time", [15e-3, 3e-3])
 @pytest.mark.parametrize("gain", [60.0, 120.0, 250.0])
 def test_stick_slip_is_foreseen(integral_time: float, gain: float) -> None:

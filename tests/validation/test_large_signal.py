@@ -83,7 +83,8 @@ def test_the_baseline_reverses_too_slowly_for_the_lag() -> None:
     ("ctms-motor-position", {}, {}, "no speed limit"),
     ("ilr33-amber", {"limits.voltage": 5.6}, {}, "not every load"),
     # dry friction holds the drive: nothing to compare, and no division by a motion that is none
-    ("ilr33-amber", {}, {"amplitude_rad": 1e-7, "frequency_hz": 1.0}, "stands still"),
+    ("ilr33-amber", {}, {"amplitude_rad": 1e-7, "frequency_hz": 1.0}, "0 N m the output stands still"),
+    ("ballscrew", {}, {"amplitude_rad": 1e-9, "frequency_hz": 1.0}, "0 N the output stands still"),
 ])  # fmt: skip
 def test_not_applicable_with_a_reason(name: str, changed: dict, asked: dict, word: str) -> None:
     result = sawtooth(with_values(load_design(name), changed), **asked)

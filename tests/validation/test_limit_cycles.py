@@ -156,15 +156,6 @@ def test_no_cycle_is_found_where_there_is_none() -> None:
     assert cycles_of_quantisation(counting(4000, speed="ideal")) == ()
 
 
-def test_amplitudes_go_with_the_play() -> None:
-    """Without friction a drive with twice the play has twice the cycle, at the same frequency."""
-    wide = with_overrides(FIN, {"coupling.play": "3 mrad"})
-    cycles = [cycles_of_play(each, friction=False) for each in (FIN, wide)]
-    for one, two in zip(*cycles, strict=True):
-        assert two.output_rad == pytest.approx(2.0 * one.output_rad, rel=1e-6)
-        assert two.frequency_hz == pytest.approx(one.frequency_hz, rel=1e-6)
-
-
 def test_a_count_makes_a_cycle_at_the_gain_border_of_the_loop() -> None:
     """A relay of one count has the gain 2 q/(pi A); in a clean drive without friction the cycle is there."""
     (cycle,), free = cycles_of_quantisation(FIN), describing.without_nonlinearities(FIN)

@@ -33,10 +33,15 @@ def rows(design: Design, model: Design | None = None) -> dict[str, Row]:
     return {row.name: row for place in onsets for row in small_signal(place)}
 
 
-@pytest.mark.parametrize("name", shipped_designs())
-def test_every_limit_of_a_shipped_drive(name: str) -> None:
+SLOPED = changed(
+    load_design("ilr33-amber-multirate"), name="a slope of the current", limits={"current_rate_A_s": 1e3},
+    controller={"position": {"feedforward": 0.9}},
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("design", [*map(load_design, shipped_designs()), SLOPED], ids=lambda one: one.name)
+def test_every_limit_of_a_drive(design: Design) -> None:
     """Each limiter that the limit of linear validity lists has its row, and it is met."""
-    design = load_design(name)
     border = onset(Bench(design, design).loops("command"), [10.0])
     wanted = {f"{each}_onset".replace("-", "_") for each, at in border.each_rad.items() if np.isfinite(at[0])}
     found = rows(design)

@@ -195,6 +195,7 @@ def test_what_diverges_only_after_the_run_says_so() -> None:
     ended = conduct(run)
     assert ended.status == "diverging"
     assert re.fullmatch(r"followed for \S+ s beyond the run", ended.later)
+    assert conduct(simulate(LOUD, STEP, 1e-3, limits_on=False)).status == "diverging"
 
 
 SPEED_DRIVE = """

@@ -11,7 +11,7 @@ from scipy.optimize import brentq, minimize_scalar
 
 from actuator_lti.errors import NumericalError
 from actuator_lti.margins.delays.exact import HIGHEST_ORDER, ExactDelayLoop
-from actuator_lti.margins.distances import Distance
+from actuator_lti.margins.distances import Distance, Place
 
 _MOST_INTERVALS = 60_000
 _NARROWEST = 1e-13
@@ -23,7 +23,6 @@ _MIRROR = fmpq_poly([0, -1])
 _SLACK = 1e-8  # relative: how much lower a smallest distance may be without being found
 _AT_END = (0.9, 0.99, 0.999, 0.9999, 1.0 - _SLACK)  # of that at infinity: below which a smaller one is sought
 _ROUNDS = 8
-Place = tuple[float, float]
 NOWHERE = (math.inf, math.inf)
 
 

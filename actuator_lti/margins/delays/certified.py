@@ -5,10 +5,10 @@ import math
 from flint import acb, arb, ctx, fmpq
 
 from actuator_lti.errors import NumericalError
-from actuator_lti.margins.assemble import FARTHEST, Crossing, Figures, Place, assembled
+from actuator_lti.margins.assemble import FARTHEST, Crossing, Figures, assembled
 from actuator_lti.margins.delays.axis import IMAGINARY, NOWHERE, Axis, Form, smallest, turn, zeros
 from actuator_lti.margins.delays.exact import ExactDelayLoop
-from actuator_lti.margins.distances import DISK, MODULUS, Distance
+from actuator_lti.margins.distances import DISK, MODULUS, Distance, Place
 from actuator_lti.margins.exact.decided import ACROSS, Crossings, Shared, hidden_notes, shared
 from actuator_lti.margins.given import ULP
 from actuator_lti.margins.results import StabilityMargins

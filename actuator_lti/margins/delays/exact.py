@@ -37,11 +37,9 @@ class Quasi:
         return Quasi((*self.terms, *other.terms))
 
     def late(self, delay: fmpq) -> Quasi:
-        """Behind one more delay."""
         return Quasi(tuple((p, tau + delay) for p, tau in self.terms))
 
     def times(self, factor: int) -> Quasi:
-        """A multiple."""
         return Quasi(tuple((factor * p, tau) for p, tau in self.terms))
 
     def series(self, order: int) -> fmpq_poly:

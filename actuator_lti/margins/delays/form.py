@@ -21,7 +21,6 @@ class DelayForm:
 
     @property
     def states(self) -> int:
-        """The number of states n."""
         return self.whole.shape[0] - 1 - self.delays_s.size
 
 

@@ -33,13 +33,11 @@ class Shared:
 
     @property
     def moved_text(self) -> str:
-        """What neighbours of the data change."""
         what = f"move a crossing by {self.moved:.1g}" if self.moved > _MOVED else "change nothing"
         return f"{ULP} ulp of the entries {what}"
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What is said of crossings that are left out."""
         if not self.dropped:
             return ()
         return (

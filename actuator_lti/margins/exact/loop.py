@@ -31,7 +31,6 @@ class ExactLoop:
 
     @cached_property
     def zeros(self) -> HalfPlanes:
-        """Zeros of L."""
         return half_planes(self.N)
 
     @cached_property
@@ -46,7 +45,6 @@ class ExactLoop:
 
     @cached_property
     def hidden_modes(self) -> HalfPlanes:
-        """Hidden modes."""
         return half_planes(self.hidden)
 
     @property

@@ -13,9 +13,8 @@ import numpy as np
 from flint import acb, arb, ctx
 
 from actuator_lti.margins.along import Along
-from actuator_lti.margins.assemble import Place
 from actuator_lti.margins.checked import passed_into, refuse_neutral
-from actuator_lti.margins.distances import Distance
+from actuator_lti.margins.distances import Distance, Place
 from actuator_lti.margins.exact.certified import certified_margins
 from actuator_lti.margins.exact.decided import ACROSS, hidden_notes, shared
 from actuator_lti.margins.exact.loop import ExactLoop, exact_loop, neighbours

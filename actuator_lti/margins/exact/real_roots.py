@@ -173,7 +173,6 @@ class _Evaluated:
         return None
 
     def sign(self, v: arb) -> int:
-        """Its sign at an exact place."""
         value, bits = self.value(v), ctx.prec
         while not (value > 0 or value < 0):
             if (bits := 2 * bits) > 2 * _MOST_BITS:

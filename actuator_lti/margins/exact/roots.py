@@ -37,7 +37,6 @@ class Split:
 
 
 def split(p: fmpz_poly) -> Split:
-    """Even and odd part on the imaginary axis."""
     c = p.coeffs()
     even, odd = ([-x if k % 2 else x for k, x in enumerate(part)] for part in (c[0::2], c[1::2]))
     return Split(fmpz_poly(even), fmpz_poly(odd))
@@ -77,8 +76,6 @@ def _isolated(coefficients: tuple[Any, ...], bits: int) -> list[tuple[acb, int]]
 
 @dataclass(frozen=True)
 class HalfPlanes:
-    """Where the roots of a polynomial lie."""
-
     right: int  # roots with a positive real part, multiplicities counted
     at_zero: int  # multiplicity of the root zero
     border: tuple[tuple[arb, int], ...]  # w > 0 of the roots +-j w, with their multiplicity

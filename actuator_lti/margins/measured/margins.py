@@ -148,7 +148,6 @@ class Group:
         return min(low for low, _ in spans), max(high for _, high in spans)
 
     def part(self, first: int, last: int) -> Group:
-        """Only some of its intervals."""
         chosen = slice(first - self.first, last + 1 - self.first)
         return Group(first, last, self.t0[chosen], self.t1[chosen])
 
@@ -266,7 +265,6 @@ def _reason(omega: Real, result: Bounds, known: bool) -> str:
 
 
 def _hidden(omega: Real, result: Bounds) -> list[str]:
-    """Notes on what lies between two points."""
     notes = []
     places = np.flatnonzero(result.unresolved)
     for k in places[:_TOLD].tolist():
