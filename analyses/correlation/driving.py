@@ -250,8 +250,8 @@ def load_of(design: Design, record: Record, time_s: Floats, notes: list[str]) ->
         notes.extend(f"load: the design's {key} acts" for key in own)
         return design, loads.constant(0.0)
     notes.extend(f"the recorded load holds all of it: the design's {key} is not added" for key in own)
-    bare = replace(design, load=design.load.bare())
-    return bare, loads.series(time_s, record[name], where=record.name)
+    series = loads.series(time_s, record[name], where=record.name)
+    return replace(design, load=design.load.bare()), series
 
 
 def first_states(driven: Driven, record: Record, measured: Mapping[str, Floats]) -> tuple[State, State]:

@@ -131,8 +131,7 @@ def _given(
     """What makes torques, and the load friction: what an error of each moves, found by another fit."""
     name, scale, made = constant_of(design, record), np.ones(len(lines.names)), dict[str, Fixed]()
     scale[0] += STEP
-    noise = lines.noise * np.outer(scale, scale)
-    larger = replace(lines, means=lines.means * scale[:, None], noise=noise)
+    larger = replace(lines, means=lines.means * scale[:, None], noise=lines.noise * np.outer(scale, scale))
     more = fit.reaction + STEP * (fit.reaction - 1.0 / fit.reduction)
     for one, tried, reaction in ((name, larger, fit.reaction), ("load_coefficient", lines, more)):
         if one is not None:

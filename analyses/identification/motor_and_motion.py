@@ -176,8 +176,7 @@ class Sought:
         return _with_motor(self.plain, found, records), found
 
     def _diagnosed(self, start: Design, records: Sequence[Record], both: Fit | None = None) -> Diagnosed:
-        fit = partial(self._fitted, start, both=both)
-        return diagnosed(self.design, start, records, fit, self.recipe)
+        return diagnosed(self.design, start, records, partial(self._fitted, start, both=both), self.recipe)
 
     def _raw(
         self, start: Design, records: Sequence[Record], weights: Sequence[float] | None = None

@@ -105,8 +105,7 @@ def fit_output(
     def slopes(moved: Floats) -> Floats:
         to = STEP * np.diag(np.maximum(np.abs(moved), LEAST_STEPPED))
         both = [np.clip(moved + side * to, *box) for side in (1.0, -1.0)]
-        pairs = zip(*both, strict=True)
-        change = np.array([residual(up) - residual(down) for up, down in pairs])
+        change = np.array([residual(up) - residual(down) for up, down in zip(*both, strict=True)])
         return np.asarray((change / np.diag(both[0] - both[1])[:, None]).T)
 
     options = {"method": "dogbox", "xtol": TOLERANCE, "ftol": LEAST_GAIN, "max_nfev": ITERATIONS}

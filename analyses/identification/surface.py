@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from scipy.optimize import brentq
 
-from actuator_lti.errors import InputError
+from actuator_lti.errors import InputError, NumericalError
 from actuator_lti.types import Floats
 from analyses.estimation.fit import Fit, Fixed
 from analyses.estimation.least_squares import told_apart
@@ -130,7 +130,7 @@ class _Runs:
         left = told_apart(self.x[:, columns], names)[1] if self.points else ()
         for one in left:
             why = "no run is loaded" if one.name == "CM" and not one.moves else str(one)
-            held[one.name] = Fixed(value=kept[one.name], reason=f"{why}: the design's value kept")
+            held[one.name] = Fixed(value=kept.get(one.name, 0.0), reason=f"{why}: the design's value kept")
         coefficients = len(NAMES) - len(held)
         if not coefficients:
             raise InputError("what is not fixed is not told by the runs: nothing is left to identify")
@@ -138,6 +138,9 @@ class _Runs:
             words = ("one coefficient", "two coefficients", "three coefficients")[coefficients - 1]
             told = f"{len(self.points)} usable runs: at least {coefficients + 2} are needed for {words}"
             raise InputError(told)
+        if any(one.name not in kept for one in left):
+            told = "the runs do not tell C0, Cv and CM apart: vary speed and load, not together only"
+            raise NumericalError(told)
         return held
 
     def ordinary(self) -> Floats:

@@ -88,8 +88,7 @@ def open_records(path: str | Path) -> list[Record]:
         record = replace(record, signals=signals, units={**record.units, "force": "N"})
     notes = ("" if one.signal else why.get(one.column, "") for one in record.inputs)
     pairs = zip(record.inputs, notes, strict=True)
-    inputs = tuple(replace(one, note=note or one.note) for one, note in pairs)
-    return [replace(record, inputs=inputs)]
+    return [replace(record, inputs=tuple(replace(one, note=note or one.note) for one, note in pairs))]
 
 
 def _described(path: Path) -> list[Record]:

@@ -150,8 +150,7 @@ class Record:
         note += f"{steps[widest]:.4g} s at {self.time_s[widest]:.4g} s, error up to "
         note += f"{100.0 * error:.2g} % of the range ({worst})"
         check_error(error, self.resample_tolerance, note, self.name)
-        notes = (*self.notes, note)
-        return replace(self, time_s=grid, signals=cut, notes=notes, as_read=self)
+        return replace(self, time_s=grid, signals=cut, notes=(*self.notes, note), as_read=self)
 
 
 @lru_cache(maxsize=64)

@@ -144,8 +144,7 @@ def record_of_columns(vectors: Mapping[str, Floats], spec: RecordSpec, path: Pat
     table = np.column_stack(columns)
     counts = RowCounts(rows_in=len(table), columns=header)
     block = Block(values=table, lines=np.arange(1, len(table) + 1))
-    rows = SiRows(spec, counts, f"{path}, row")(block)
-    return record_of_rows(rows, spec, path, counts, digest)
+    return record_of_rows(SiRows(spec, counts, f"{path}, row")(block), spec, path, counts, digest)
 
 
 def record_of_rows(
