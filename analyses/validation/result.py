@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from actuator_lti.asked.verdict import Tally, Verdict
 from actuator_lti.design.checks import CHECKS
 from actuator_lti.design.model import Design
+from actuator_lti.drive.signals import LIMITERS
 from analyses.friction_effects.result import FrictionEffects
 from analyses.large_signal.conditional import Conditional
 from analyses.large_signal.from_rest import AmplitudeMargin, RestSweep
@@ -104,7 +105,7 @@ class Validation:
         if self.conditional is not None and self.conditional.diverges:
             ending = {"keeps oscillating": "oscillate", "is held by a limit": "stop short"}
             does = ending.get(self.conditional.ending, "diverge")
-            by = f" ({self.conditional.limiter} limit)" if self.conditional.limiter else ""
+            by = f" ({LIMITERS[self.conditional.limiter].words})" if self.conditional.limiter else ""
             found.append(f"a command within full deflection makes the drive {does}{by}")
         return tuple(found)
 

@@ -8,6 +8,7 @@ from typing import Annotated, Any
 
 import typer
 
+from actuator_lti.bounds import COMMAND_SECONDS, STUDY_SECONDS
 from actuator_lti.errors import InputError
 from reports.analyses import ANALYSES, COMMANDS_IN, DESIGNS, EXPORTS, LINEAR, NONLINEAR, RECORDS, STUDIES
 from reports.cli import objects, report, time_limit
@@ -82,7 +83,8 @@ def about(
     Exit status of every command: 0 what is judged is met, or nothing is; 1 something is not met, or not
     proven and not waived (of bench records: not met); 2 bad input; 3 no result; 130 interrupted.
     """
-    time_limit.start(time_limit.usual(context.invoked_subcommand) if limit is None else limit)
+    usual = STUDY_SECONDS if context.invoked_subcommand in PANELS[STUDIES] else COMMAND_SECONDS
+    time_limit.start(float(usual.most) if limit is None else limit)
 
 
 @cache

@@ -5,18 +5,11 @@ import signal
 import sys
 import threading
 
-from actuator_lti.bounds import COMMAND_SECONDS, STUDY_SECONDS
 from actuator_lti.errors import OutOfTime
 
-STUDIES = ("compare", "montecarlo", "nightly", "tune")
 HARD_FACTOR, HARD_EXTRA_S = 1.25, 30.0  # the rest of a report is written between the two
 _timers: list[threading.Timer] = []
 _struck: list[str] = []
-
-
-def usual(command: str | None) -> float:
-    """The limit of a command that was given none, in s."""
-    return float((STUDY_SECONDS if command in STUDIES else COMMAND_SECONDS).most)
 
 
 def start(seconds: float) -> None:

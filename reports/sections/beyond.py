@@ -12,6 +12,7 @@ from analyses.limit_cycles.counts import WITHIN, Counts
 from analyses.limit_cycles.run import Confirmation
 from reports import document as doc
 from reports.charts import style
+from reports.sections.limits import words_of
 from reports.sections.names import POINTS, Unit, fine_unit, output_unit, speed_unit
 
 
@@ -60,14 +61,14 @@ def _words(conditional: Conditional, out: Unit) -> list[str]:
     if conditional.ending:
         words += f": {ENDINGS[conditional.ending].format(swing=out.of(conditional.end_rad or 0.0))}"
         share = f"{100 * conditional.limiter_share:.0f} % of the time"
-        words += f"; the {conditional.limiter} limit acts {share}" * bool(conditional.limiter)
+        words += f"; the {words_of(conditional.limiter)} acts {share}" * bool(conditional.limiter)
     made, hz, swing = [f"{words}."], conditional.oscillation_hz, conditional.oscillation_rad
     if hz is not None and swing is not None:
         made.append(f"At the threshold the output nears a limit cycle of {out.of(swing)} at {hz:.3g} Hz.")
         best = next((one for one in conditional.predictions if not one.antiwindup), None)
         if best is not None:
             size = f"{out.of(best.output_rad)} at {best.frequency_hz:.3g} Hz"
-            made.append(f"The describing function of the {best.limiter} limit predicts {size}.")
+            made.append(f"The describing function of the {best.limiter} predicts {size}.")
     return made
 
 

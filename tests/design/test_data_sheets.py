@@ -221,6 +221,9 @@ def test_a_filter_is_added_behind_those_that_there_are() -> None:
     assert [item.kind for item in two.controller.velocity.filters] == ["notch", "lowpass"]
     assert two.controller.velocity.filters[0].width_rad_s == pytest.approx(120 * pi, rel=1e-15)
     assert two.controller.velocity.filters[1].frequency_rad_s == 500.0
+    deeper = with_overrides(two, {"control.velocity.filter.1.depth": 0.2})
+    assert [item.depth for item in deeper.controller.velocity.filters[:1]] == [0.2]
+    assert read_design_text(write_design(deeper), deeper.origin) == deeper
     for bad, words in (
         ({"stage": "current"}, 'stage = "current": has no filters; allowed: "velocity"'),
         ({"stage": "velocity", "kind": "notch", "frequency": "1 V"}, "filter.1.frequency"),
@@ -622,7 +625,7 @@ def test_speed_and_force_of_a_linear_axis_behind_gears_are_those_of_the_output()
 
 
 @pytest.mark.parametrize(("key", "stated", "half", "words"), [
-    ("motor.rotor_inertia", "9.2 g*cm^2", 4.6e-7, "4.6 g cm^2"),
+    ("motor.rotor_inertia", "9.2 g*cm^2", 4.6e-7, "4.6 g cm²"),
     ("friction.breakaway_ratio", "2", 1.0, "1"),
     ("motor.back_emf_constant", "1618.5 rpm/V", 0.00295, "0.00295 V s/rad"),  # half of it is twice the rpm/V
 ])  # fmt: skip

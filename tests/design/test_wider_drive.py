@@ -32,16 +32,6 @@ STIFF = {"stiffness": "100 N*m/rad"}
 NOTCH = {"kind": "notch", "frequency": "640 rad/s", "width": "320 rad/s", "depth": 0.1}
 
 
-def test_filters_keep_their_order_and_have_keys_of_their_own() -> None:
-    design = with_overrides(AMBER, {FILTER: [NOTCH, {"kind": "lowpass", "frequency": "1 kHz"}]})
-    first, second = design.controller.velocity.filters
-    assert (first.frequency_rad_s, first.width_rad_s, first.depth) == (640.0, 320.0, 0.1)
-    assert second.frequency_rad_s == pytest.approx(2 * pi * 1000, rel=1e-15)
-    changed = with_overrides(design, {"control.velocity.filter.1.depth": 0.2})
-    assert changed.controller.velocity.filters[0].depth == 0.2
-    assert read_design_text(write_design(changed), changed.origin) == changed
-
-
 def test_the_two_meanings_of_a_peak_time_of_one_design_and_of_many() -> None:
     """r = 3 for one second: tau = t/ln(r^2/(r^2 - 1)), 8.490187 s (model.md section 6); in excess r^2 - 1."""
     base = with_overrides(AMBER, {"limits.peak_time": "1 s"})

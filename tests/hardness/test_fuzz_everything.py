@@ -6,6 +6,7 @@ import re
 import struct
 import zlib
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -18,6 +19,7 @@ from actuator_lti.bounds import JSON_DEPTH, KEY_PARTS, TEXT_CHARACTERS, TOML_BYT
 from actuator_lti.design.loader import design_text
 from actuator_lti.files.reading import parse_json, parse_toml, read_bytes, read_json
 from analyses.estimation.least_squares import solve
+from analyses.records import campaign_file
 from analyses.records.campaign_file import load_campaign
 from analyses.records.csv_stream import read_csv_record
 from analyses.records.differentiation import filtered_motion
@@ -221,14 +223,15 @@ def test_a_small_file_that_unpacks_to_gigabytes(tmp_path) -> None:
     refusals.refused(read_record, path, SPEC, words=("numbers of a .mat or Parquet file",))
 
 
-def test_twenty_thousand_runs_are_read_and_one_more_is_not(tmp_path) -> None:
+def test_twenty_thousand_runs_are_read_and_one_more_than_allowed_is_not(tmp_path, monkeypatch) -> None:
     head, run = CAMPAIGN.split(b"[[run]]")
     path = tmp_path / "c.toml"
     runs = b"".join(b"[[run]]" + run.replace(b'"01"', b'"%d"' % k) for k in range(bounds.CAMPAIGN_RUNS.most))
     path.write_bytes(head + runs)
     assert len(load_campaign(path).runs) == bounds.CAMPAIGN_RUNS.most
-    path.write_bytes(head + runs + b"[[run]]" + run)
-    words = "[[run]]: 20001 runs of a campaign; allowed: at most 20000"
+    monkeypatch.setattr(campaign_file, "CAMPAIGN_RUNS", replace(bounds.CAMPAIGN_RUNS, most=1))
+    path.write_bytes(head + b"[[run]]" + run + b"[[run]]" + run.replace(b'"01"', b'"02"'))
+    words = "[[run]]: 2 runs of a campaign; allowed: at most 1"
     refusals.refused(load_campaign, path, words=(words,))
 
 

@@ -21,9 +21,9 @@ def killed(script: str, *words: object) -> dict:
     return json.loads(done.stdout)
 
 
-def test_a_kill_at_any_call_loses_nothing(tmp_path) -> None:
+def test_a_kill_at_any_call_loses_nothing(in_memory) -> None:
     """Each of them once: a site or a history out of order shows between two of its calls alone."""
-    outcome = killed("kill_at_calls.py", tmp_path / "site")
+    outcome = killed("kill_at_calls.py", in_memory / "site")
     assert outcome["killed"] == outcome["calls"] > 100
 
 

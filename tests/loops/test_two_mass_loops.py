@@ -5,18 +5,16 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from loop_designs import controlled, drive_d, drive_e
+from loop_designs import controlled, drive_d
 
 from actuator_lti import assemble_loops, load_design, stability_margins
 from actuator_lti.asked.drive_figure import drive_figure
 from actuator_lti.batch import Population
 from actuator_lti.batch import drive_figures as many
 from actuator_lti.design import model
-from actuator_lti.design.model import Requirement
 from actuator_lti.drive.blocks import biquad
 from actuator_lti.drive.operating import Operating, slope_at
-from actuator_lti.loops.stiffness import StiffnessFigures, compliance
-from analyses import evaluate_requirements
+from actuator_lti.loops.stiffness import compliance
 from nonlinear import commands, simulate
 from tests.changed import changed
 
@@ -115,18 +113,6 @@ def test_stacked_designs_have_the_figures_of_each_alone(name, values, quantities
         for k in range(count):
             alone = Population(design, {path: each[k : k + 1] for path, each in stacked.items()}, 1)
             assert together[k] == pytest.approx(many(alone, quantity)[0], rel=1e-9)
-
-
-def test_static_stiffness_by_hand() -> None:
-    """P on the motor's sensor, a velocity integral: the spring alone, 400 N m/rad; a rigid one comes back."""
-    assert drive_figure(drive_e(), "static_stiffness") == pytest.approx(400.0, rel=1e-6)
-    assert StiffnessFigures(replace(drive_e(), coupling=None)).static_stiffness_Nm_rad == np.inf
-    stiff = [
-        Requirement(id=str(limit), quantity="static_stiffness", unit="N*m/rad", minimum=limit)
-        for limit in (399.0, 401.0)
-    ]
-    verdicts = evaluate_requirements(replace(drive_e(), requirements=tuple(stiff)))
-    assert [one.verdict for one in verdicts] == ["met", "not met"]
 
 
 def test_a_drive_that_creeps_for_hours_has_a_stiffness_and_one_without_position_loop_none() -> None:

@@ -63,7 +63,7 @@ def test_unusable_data(omega: list[float], values: list[float], message: str) ->
 
 Response = Callable[[np.ndarray], np.ndarray]
 BAND = (0.1, 3000.0)
-OMEGA = np.geomspace(*BAND, 400)
+OMEGA, FINE = np.geomspace(*BAND, 400), np.geomspace(*BAND, 300_001)
 
 
 def light_plant(rng: np.random.Generator) -> Response:
@@ -92,22 +92,20 @@ def light_plant(rng: np.random.Generator) -> Response:
     return L
 
 
-def crossings(L: Response) -> tuple[list[tuple[float, float]], list[tuple[float, float]]]:
+def crossings(y: np.ndarray) -> tuple[list[tuple[float, float]], list[tuple[float, float]]]:
     """(frequency, margin) of every crossing of the exact response: phase in deg, then gain."""
-    omega = np.geomspace(*BAND, 300_001)
-    y = L(omega)
     unity = np.flatnonzero((np.abs(y[1:]) > 1) != (np.abs(y[:-1]) > 1))
     real = np.flatnonzero(((y.imag[1:] > 0) != (y.imag[:-1] > 0)) & (y.real[:-1] < 0))
-    phase = [(float(omega[k]), math.degrees(np.angle(-y[k]))) for k in unity]
-    return phase, [(float(omega[k]), float(1 / abs(y[k]))) for k in real]
+    phase = [(float(FINE[k]), math.degrees(np.angle(-y[k]))) for k in unity]
+    return phase, [(float(FINE[k]), float(1 / abs(y[k]))) for k in real]
 
 
-def coverage(m: StabilityMargins, L: Response) -> tuple[int, int, int]:
+def coverage(m: StabilityMargins, y: np.ndarray) -> tuple[int, int, int]:
     """Listed margins, those that do not hold the truth, and true crossings neither listed nor noted.
 
     The dense grid of the truth leaves 1e-4 in frequency, 0.05 deg and 1e-3 in gain.
     """
-    phase, gain = crossings(L)
+    phase, gain = crossings(y)
     said = (re.findall(r"between (\S+) and (\S+) rad/s", text) for text in m.notes)
     spans = [(float(a), float(b)) for found in said for a, b in found]
     wrong = missed = 0
@@ -164,9 +162,8 @@ def coherent(rng: np.random.Generator, L: Response) -> MeasuredResponse:
     return MeasuredResponse.from_coherence(control.frd(sxy / sxx, OMEGA), coherence, n)
 
 
-def nearest(L: Response) -> tuple[float, float]:
+def nearest(y: np.ndarray) -> tuple[float, float]:
     """Smallest |1 + L| and |2 (1 + L)/(1 - L)| of the exact response over the band."""
-    y = L(np.geomspace(*BAND, 300_001))
     return float(np.abs(1 + y).min()), float((2 * np.abs((1 + y) / (1 - y))).min())
 
 
@@ -177,10 +174,10 @@ def test_ranges_hold_the_truth_on_lightly_damped_plants(measured: Callable[..., 
     far = []
     for k in range(40):
         L = light_plant(rng)
-        m = stability_margins(measured(rng, L))  # never refused
-        counts = coverage(m, L)
+        m, y = stability_margins(measured(rng, L)), L(FINE)  # never refused
+        counts = coverage(m, y)
         listed, wrong, missed = listed + counts[0], wrong + counts[1], missed + counts[2]
-        for true, (low, high) in zip(nearest(L), (m.modulus_range, m.disk_margin.alpha_range), strict=True):
+        for true, (low, high) in zip(nearest(y), (m.modulus_range, m.disk_margin.alpha_range), strict=True):
             told += low > 0.0
             if not low * (1 - 1e-3) <= true <= high * (1 + 1e-3):
                 far.append((k, true, low, high))
@@ -237,26 +234,6 @@ def test_values_lost_in_noise_give_no_gain_margin() -> None:
 ])  # fmt: skip
 def test_unusable_noise(call: Callable[..., MeasuredResponse], message: str) -> None:
     refused(call, control.frd([1.0, 0.5], [1.0, 2.0]), match=message)
-
-
-def test_noise_widens_every_range() -> None:
-    exact = stability_margins(A1)
-    data = control.frd(A1, np.geomspace(0.2, 8, 300))
-    ranges = []
-    for sigma in (0.0, 0.01, 0.02):
-        m = stability_margins(MeasuredResponse.with_noise(data, sigma) if sigma else data)
-        assert m.modulus_range[0] <= exact.modulus_margin <= m.modulus_range[1]
-        assert m.disk_margin.alpha_range[0] <= exact.disk_margin.alpha <= m.disk_margin.alpha_range[1]
-        assert f"in [{m.modulus_range[0]:.4g}, {m.modulus_range[1]:.4g}]" in str(m)
-        (phase,) = m.phase_margins
-        ranges.append((m.modulus_range, phase.deg_range))
-    (none, of_none), (one, of_one), (two, of_two) = ([high - low for low, high in both] for both in ranges)
-    assert none < 0.01
-    assert one > 0.02
-    assert two > 1.7 * one
-    assert of_none < 0.1 * of_one
-    # of a curve that bends, known at n points: as noise^(4/5) n^(-2/5) (Stone 1982); each point alone: 2
-    assert of_two == pytest.approx(2**0.8 * of_one, rel=0.1)
 
 
 def test_crossings_that_a_coarse_measurement_tells_apart_are_listed_apart() -> None:
@@ -371,8 +348,10 @@ def test_a_hidden_bend_is_not_averaged_away() -> None:
     L = lagging(WC, LAG, DELAY)(omega) * dip
     data = control.frd(L * (1.0 + 0.01 * circular(rng, omega.shape)), omega)
     for given in (data, MeasuredResponse.with_noise(data, 0.01 * np.abs(L))):
-        low, high = stability_margins(given).modulus_range
+        m = stability_margins(given)
+        low, high = m.modulus_range
         assert low <= np.abs(1.0 + L).min() <= high
+        assert f"in [{low:.4g}, {high:.4g}]" in str(m)
 
 
 def test_doubtful_crossings_are_counted_in_one_line() -> None:

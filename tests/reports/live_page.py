@@ -2,6 +2,7 @@
 
 import json
 import math
+import re
 from collections.abc import Callable
 from hashlib import sha256
 from itertools import product
@@ -143,10 +144,10 @@ class Live:
         return path
 
 
-def command_line(path: Path | str, part: str = "loops") -> Any:
+def command_line(path: Path | str) -> Any:
     done = CliRunner().invoke(build(), ["margins", str(path), "--json"])
     assert done.exit_code in (0, 1), done.output
-    return json.loads(done.stdout)[part]
+    return json.loads(done.stdout)
 
 
 def verdicts_agree(page: Page, verdicts: list[dict[str, Any]]) -> None:
@@ -177,6 +178,44 @@ def agree(ours: dict[str, dict[str, float]], loops: dict[str, Any], filtered: bo
                 assert not math.isfinite(ours[loop][name]), (loop, name)
             elif math.isfinite(result[key]):
                 assert ours[loop][name] == pytest.approx(result[key], rel=1e-9, abs=1e-9), (loop, name)
+
+
+HANDS, SIZE = '.toc a[href="#hands-on"]', ".run-keys label:has-text('Size') input"
+EACH, LOOPS = "#answer details.fold > summary", "table.loops"
+# question: what is clicked (and typed), where the answer stands, and what it looks like
+QUESTIONS = {
+    "Is it good?": ([], ".masthead .overall", r"\d+ of \d+ requirements met"),
+    "Which loop is worst?": ([], ".weakest strong", r"(Current|Velocity|Position) loop"),
+    "By how much?": ([], ".weakest", r"not stable|margin [−-]?[\d.]+.*(above|below)"),
+    "Who checked that?": ([], ".said a", r"checked|checks"),
+    "Is it linear?": ([], '.said a[href="#limits"]', r"linear (up to [\d.]+ Hz; above, the .+ acts|over)"),
+    "What is nearest?": ([], ".bar-row >> nth=0", r"[\d.]+\n?\s*[≥≤] [\d.]+"),
+    "How fast is it?": ([EACH], LOOPS, r"bandwidth[\s\S]+[\d.]+ "),
+    "How much delay can I add?": ([HANDS], "#hands-on .now", r"Delay margin ms[\s\S]+loop\t[\s\S]+\d"),
+    "What happens at 20?": ([HANDS, SIZE], ".acting", r"^(No limit acts|Limits that act).+changed"),
+    "What is assumed?": (['.toc a[href="#parameters"]'], "#parameters", r"\d+ of them assumed"),
+    "Where is phase lost?": (['.toc a[href="#delays"]'], "#delays", r"delay[\s\S]+deg"),
+}  # fmt: skip
+
+
+def answered_within_two_clicks(page: Page) -> None:
+    """Ten questions on a screen of 1400 by 900; what is not clicked for is seen without scrolling."""
+    page.set_viewport_size({"width": 1400, "height": 900})
+    for question, (clicks, place, pattern) in QUESTIONS.items():
+        assert len(clicks) <= 2
+        page.goto(page.url.split("#")[0] + "#content")
+        for each in clicks:
+            page.click(each)
+        if SIZE in clicks:
+            page.fill(SIZE, "20")
+            page.press(SIZE, "Enter")
+            page.done()
+        answer = page.locator(place).first
+        assert answer.is_visible(), question
+        assert re.search(pattern, answer.inner_text()), (question, answer.inner_text())
+        if not clicks:
+            box = answer.bounding_box()
+            assert box["y"] + box["height"] <= 900, question
 
 
 def same_figures(page: Page, design: Design, what: str = "") -> None:

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pypdf
 import pytest
-from live_page import Built
+from live_page import Built, Page
 
 AXE = Path(__file__).parents[2] / "node_modules" / "axe-core" / "axe.min.js"  # by `make page`
 FOUND = """() => axe.run(document, { resultTypes: ["violations"] }).then(({ violations }) => violations
@@ -22,13 +22,19 @@ SCREENS = {
     "desktop, dark": {**DESK, "color_scheme": "dark"},
     "phone": {"viewport": {"width": 390, "height": 844}, "color_scheme": "light"},
 }
+LIGHT = """() => [["body", "backgroundColor"], ["figure svg text", "fill"]].map(([of, part]) =>
+    getComputedStyle(document.querySelector(of))[part].match(/\\d+/g).reduce((sum, x) => sum + +x, 0))"""
 FIRST = (".overall", ".weakest", ".said", ".bars", "#answer figure.half", ".findings")
 
 
 @pytest.mark.parametrize("screen", SCREENS)
-def test_no_sideways_scrolling_and_every_figure_with_ink(opens, built: Built, screen: str) -> None:
+def test_no_sideways_scrolling_every_figure_with_ink_and_the_ground_is_dark_where_asked(
+    opens, built: Built, screen: str
+) -> None:
     page, wide = opens(built.page, **SCREENS[screen]), SCREENS[screen]["viewport"]["width"]
     assert page.evaluate("document.documentElement.scrollWidth") <= wide
+    ground, ink = page.evaluate(LIGHT)
+    assert (ground < ink) is ("dark" in screen)
     page.evaluate(OPEN_ALL)
     figures = page.locator("figure svg.plot")
     assert figures.count() == built.page.read_text(encoding="utf-8").count('<svg class="plot"') > 10
@@ -38,16 +44,8 @@ def test_no_sideways_scrolling_and_every_figure_with_ink(opens, built: Built, sc
         assert figure.locator(".world path, .marks use").count() > 2
 
 
-def test_dark_and_light_differ(opens, built: Built) -> None:
-    colours = set()
-    for scheme in ("light", "dark"):
-        page = opens(built.page, color_scheme=scheme)
-        colours.add(page.locator("figure svg text").first.evaluate("e => getComputedStyle(e).fill"))
-        colours.add(page.evaluate("getComputedStyle(document.body).backgroundColor"))
-    assert len(colours) == 4
-
-
-def test_the_first_screen_is_one_screen_and_the_open_page_few(opens, built: Built) -> None:
+def test_the_first_screen_is_one_screen_its_bars_to_scale_and_the_open_page_few(opens, built: Built) -> None:
+    """Bar and limit stand on one scale from 0: their ratio is that of the numbers."""
     page = opens(built.page, **DESK)
     for selector in FIRST:
         for part in page.locator(selector).all():
@@ -55,11 +53,6 @@ def test_the_first_screen_is_one_screen_and_the_open_page_few(opens, built: Buil
             assert 0 <= box["y"] <= 900 - box["height"], (selector, box)
     assert page.locator(".findings li").count() <= 3
     assert page.evaluate("document.documentElement.scrollHeight") <= 6 * 900
-
-
-def test_a_bar_is_as_long_as_its_figure(opens, built: Built) -> None:
-    """Bar and limit stand on one scale from 0: their ratio is that of the numbers."""
-    page = opens(built.page, **DESK)
     bars = next(one for one in built.document["sections"][0]["blocks"] if one["kind"] == "glance")["bars"]
     assert len(bars) == page.locator(".bar-row").count() == 12
     for bar, row in zip(bars, page.locator(".bar-row").all(), strict=True):
@@ -85,15 +78,35 @@ def test_a_link_opens_the_fold_that_it_leads_into(opens, built: Built) -> None:
     assert page.locator("#limits figure").is_hidden()
 
 
-def test_the_summary_prints_on_four_pages(opens, built: Built) -> None:
-    page = opens(built.page)
-    page.emulate_media(media="print")
-    sheets = pypdf.PdfReader(io.BytesIO(page.pdf(prefer_css_page_size=True))).pages
+def printed(page: Page) -> list[pypdf.PageObject]:
+    """Its sheets; figures have their room, but none of the curves that are long to read."""
+    page.evaluate(
+        "document.querySelectorAll('figure svg').forEach(({ style }) => style.visibility = 'hidden')"
+    )
+    return list(pypdf.PdfReader(io.BytesIO(page.pdf(prefer_css_page_size=True))).pages)
+
+
+def test_paper_is_white_short_and_ends_no_page_with_a_heading(opens, built: Built) -> None:
+    """The summary on four pages; with all folds open, too."""
+    page = opens(built.page, color_scheme="dark")
+    page.emulate_media(media="print", color_scheme="dark")
+    assert page.evaluate("getComputedStyle(document.body).backgroundColor") == "rgb(255, 255, 255)"
+    assert not page.locator(".toc").is_visible()
+    sheets = printed(page)
     assert len(sheets) <= 4
     words = "".join("".join(sheet.extract_text().split()) for sheet in sheets)
-    printed = unicodedata.normalize("NFKC", words)
+    summary = unicodedata.normalize("NFKC", words)
     for part in built.document["sections"]:
-        assert "".join(part["title"].split()) in printed or part["id"] == "answer"
+        assert "".join(part["title"].split()) in summary or part["id"] == "answer"
+    page.evaluate(OPEN_ALL.replace("main details", ".claim > details"))
+    sheets = printed(page)
+    assert len(sheets) <= 15
+    titles = {part["title"] for part in built.document["sections"]}
+    results = " ".join(part["result"] for part in built.document["sections"])
+    for sheet in sheets:
+        last = sheet.extract_text().strip().splitlines()[-1].strip()
+        assert last not in titles
+        assert last not in results
 
 
 def test_the_buttons_choose_what_is_printed_and_put_the_folds_back(opens, built: Built) -> None:
@@ -117,26 +130,11 @@ def test_the_keyboard_reaches_the_content(opens, built: Built) -> None:
     assert page.evaluate("document.activeElement.id") == "content"
 
 
-def test_paper_is_white_short_and_ends_no_page_with_a_heading(opens, built: Built) -> None:
-    page = opens(built.page, color_scheme="dark")
-    page.evaluate(OPEN_ALL.replace("main details", ".claim > details"))
-    page.emulate_media(media="print", color_scheme="dark")
-    assert page.evaluate("getComputedStyle(document.body).backgroundColor") == "rgb(255, 255, 255)"
-    assert not page.locator(".toc").is_visible()
-    sheets = pypdf.PdfReader(io.BytesIO(page.pdf(prefer_css_page_size=True))).pages
-    assert len(sheets) <= 15
-    titles = {part["title"] for part in built.document["sections"]}
-    results = " ".join(part["result"] for part in built.document["sections"])
-    for sheet in sheets:
-        last = sheet.extract_text().strip().splitlines()[-1].strip()
-        assert last not in titles
-        assert last not in results
-
-
 @pytest.mark.skipif(not AXE.exists(), reason="axe-core is not installed: make page")
-@pytest.mark.parametrize("scheme", ["light", "dark"])
-def test_axe_finds_nothing_serious_and_few_stops_to_tab(opens, built: Built, scheme: str) -> None:
-    page = opens(built.page, bypass_csp=True, color_scheme=scheme)
+def test_axe_finds_nothing_serious_and_few_stops_to_tab(opens, built: Built) -> None:
+    page = opens(built.page, bypass_csp=True)
     page.evaluate(AXE.read_text(encoding="utf-8"))
-    assert page.evaluate(FOUND) == []
+    for scheme in ("light", "dark"):
+        page.emulate_media(color_scheme=scheme)
+        assert page.evaluate(FOUND) == []
     assert page.evaluate(STOPS) < 220

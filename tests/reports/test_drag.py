@@ -183,7 +183,7 @@ def test_variants_stand_side_by_side_and_undo_holds(opens, tmp_path) -> None:
     for letter, gain in (("A", 80.0), ("B", 140.0)):
         page.type_value("control.position.gain", gain)
         press(page, "pin")
-        wanted[letter] = command_line(page.saved(tmp_path / f"{letter}.toml"))["position"]
+        wanted[letter] = command_line(page.saved(tmp_path / f"{letter}.toml"))["loops"]["position"]
     press(page, "reset")
     followed = page.evaluate(f"{LIVE}.figures")
     for letter, figures in wanted.items():

@@ -58,7 +58,7 @@ def test_a_requirement_that_fails_is_said_at_once(page: Page, tmp_path) -> None:
     assert page.get_attribute(".state", "data-failing") == "0"
     page.type_value("control.position.gain", 590.0)
     failing = int(page.get_attribute(".state", "data-failing") or 0)
-    found = command_line(page.saved(tmp_path / "hot.toml"), "requirements")
+    found = command_line(page.saved(tmp_path / "hot.toml"))["requirements"]
     verdicts = [item for item in found if item["verdict"] == "not met"]
     assert failing == sum(item["loop"] is not None for item in verdicts) > 0
     assert f"{failing} not met" in page.inner_text(".state")

@@ -2,7 +2,6 @@
 
 import json
 import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,12 +11,13 @@ from actuator_lti import assemble_loops, load_design, stability_margins
 from actuator_lti.compiled.compiler import system_compiler
 from actuator_lti.design import with_values
 from analyses.linear.outer_loop import loop_around, outer_loop
+from examples.exported_drive import ExportedDrive
 from reports.cli.main import main
 
 needs_compiler = pytest.mark.skipif(
     system_compiler() is None or not sys.platform.startswith("linux"), reason="no C compiler on this machine"
 )
-PERIOD = 1e-3
+PERIOD, TICK_S = 1e-3, 1e-4
 # roll rate under a fin angle, p' = -2 p + 60 delta, and half of it given back: one pole
 AIRFRAME = {"num": [30.0], "den": [1.0, 2.0], "dt": 0, "sampling_period": PERIOD, "name": "roll rate"}
 # a weathercock mode with a lag, in matrices
@@ -27,16 +27,19 @@ WEATHERCOCK = {
 }  # fmt: skip
 
 
-def growth(table: dict, factor: float, folder: Path, seconds: float) -> float:
-    """Largest output of the last third over that of the second, the drive as its exported C in the loop."""
-    from examples.exported_drive import ExportedDrive
-
+@pytest.fixture(scope="module")
+def drive(tmp_path_factory) -> ExportedDrive:
+    """The exported C of a drive without dry friction."""
     without = {"friction.dry_torque": 0.0, "friction.load_coefficient": 0.0}
-    design = with_values(load_design("ilr33-amber"), without)
-    drive = ExportedDrive(design, folder)
+    return ExportedDrive(with_values(load_design("ilr33-amber"), without), tmp_path_factory.mktemp("drive"))
+
+
+def growth(table: dict, factor: float, drive: ExportedDrive, seconds: float) -> float:
+    """Largest output of the last third over that of the second, the exported drive in the loop from rest."""
+    drive.reset()
     matrices = table if "A" in table else {"A": [[-2.0]], "B": [[60.0]], "C": [[0.5]]}
     A, B, C = (np.array(matrices[key]) for key in "ABC")
-    n, ticks = A.shape[0], round(table["sampling_period"] / design.controller.period_s)
+    n, ticks = A.shape[0], round(table["sampling_period"] / TICK_S)
     step = expm(np.block([[A, B], [np.zeros((1, n + 1))]]) * table["sampling_period"])
     x, angle, result = np.full(n, 1e-5), 0.0, []
     for _ in range(round(seconds / table["sampling_period"])):
@@ -51,13 +54,13 @@ def growth(table: dict, factor: float, folder: Path, seconds: float) -> float:
 
 @needs_compiler
 @pytest.mark.parametrize(("table", "seconds"), [(AIRFRAME, 0.6), (WEATHERCOCK, 1.5)])
-def test_the_running_drive_decays_below_the_gain_margin_and_grows_above(table, seconds, tmp_path):
+def test_the_running_drive_decays_below_the_gain_margin_and_grows_above(table, seconds, drive):
     loop = loop_around(assemble_loops("ilr33-amber"), outer_loop(table, "test"))
     result = stability_margins(loop.open_loop)
     assert result.stable
     limit = min(margin.ratio for margin in result.gain_margins if margin.ratio > 1.0)
     assert loop.period_s == table["sampling_period"]
-    below, above = (growth(table, share * limit, tmp_path, seconds) for share in (0.97, 1.03))
+    below, above = (growth(table, share * limit, drive, seconds) for share in (0.97, 1.03))
     assert below < 1.0 < above
 
 

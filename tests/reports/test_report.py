@@ -189,19 +189,11 @@ def test_names_in_a_figure_stay_text_and_a_label_of_two_panels_is_said_once(on_p
     assert ("var(--" in svg) is on_page
 
 
-@pytest.mark.parametrize("name", ["ctms-motor-position", "ilr33-amber-multirate", "emps"])
-def test_every_shipped_design_has_its_report(name: str) -> None:
-    document = design_report(load_design(name))
-    content = page(document)
-    assert document["verdict"]["passed"]
-    live = re.findall(r'<figure class="scroll figure" data-chart="(\w+)"', content)
-    assert live == ["bode", "nyquist", "sensitivity", "step", "run", "border", "difference"]
-    assert content.count('<div class="chart"') == len(doc.figures(document)) + len(live) > 11
-
-
 def test_an_unstable_design_is_called_unstable_and_still_drawn() -> None:
     document = design_report(with_values(load_design("ilr33-amber"), {"control.velocity.gain": 5.0}))
     assert document["verdict"]["parts"]["requirements"]["not_met"] > 0
+    (part,) = (part for part in document["sections"] if part["id"] == "margins")
+    assert part["result"].startswith("Not stable: velocity loop")
     (row,) = (r for r in rows_of(document, "margins", "Stability") if r["loop"] == "Velocity loop")
     unstable = {"stable": {"text": "unstable", "status": "fail"}, "delay_margin_ms": None}
     assert {key: row[key] for key in unstable} == unstable  # an unstable loop has no margins

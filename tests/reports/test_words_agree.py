@@ -13,7 +13,6 @@ from actuator_lti.design import load_design, with_values
 from actuator_lti.design.model import Coupling
 from analyses.large_signal.result import LimitShift
 from analyses.limit_cycles import LimitCycles
-from analyses.linear.loop_figures import all_loop_figures
 from analyses.linear.loop_survey import operating_points
 from analyses.margins import Asked as MarginsAsked
 from analyses.margins import margins
@@ -118,13 +117,6 @@ def test_all_that_is_said_sliding_is_of_one_load_where_that_bends_a_spring() -> 
     judged, plain = ([one.value for one in each.requirements] for each in (found, margins(design)))
     assert judged == pytest.approx(plain, rel=1e-9)
     assert "with sliding friction, without a load." in brief(found).words
-
-
-def test_a_loop_that_is_known_to_be_unstable_is_said_to_be() -> None:
-    design = load_design("ilr33-amber")
-    gain = 30.0 * design.controller.velocity.gain  # the upper gain margin is 23.1 dB, a factor of 14.3
-    figures = all_loop_figures(assemble_loops(with_values(design, {"control.velocity.gain": gain})))
-    assert result(figures).startswith("Not stable: velocity loop")
 
 
 def test_a_bandwidth_says_by_its_name_of_which_response_it_is() -> None:

@@ -97,6 +97,18 @@ def test_the_validator_says_so() -> None:
     assert "although every loop is stable by its linear margins" in words
 
 
+def test_limits_are_named_as_everywhere() -> None:
+    """It said "the voltage limit limit" and "the overload limit"."""
+    seen = behind_limits.Prediction("u", 12.0, "voltage limit", 0.5, 20.0, 8.0, 0.01, antiwindup=False)
+    found = behind_limits.Conditional(
+        margins={}, predictions=(seen,), threshold_rad=0.1, next_rad=0.11, full_deflection_rad=0.2,
+        oscillation_hz=8.0, oscillation_rad=0.01, limiter="overload", ending="diverges",
+    )  # fmt: skip
+    made = section(found)
+    assert "the overload protection acts" in made["result"]
+    assert "The describing function of the voltage limit predicts" in made["blocks"][1]["text"]
+
+
 def test_saturation_gain() -> None:
     """Analytic: 1 up to the limit, 1/3 + sqrt(3)/(2 pi) at twice the limit, 4/(pi a) far beyond."""
     assert behind_limits.saturation_gain(0.5) == 1.0
