@@ -48,8 +48,26 @@ def opens(browser, once) -> Iterator[Callable[..., Any]]:
 
 
 @pytest.fixture
-def page(opens) -> Any:
-    """The page of ilr33-amber, once it has followed."""
+def fresh(opens) -> Any:
+    """The page of ilr33-amber, once it has followed; nothing has happened on it."""
     made = opens(AMBER)
     made.done()
     return made
+
+
+@pytest.fixture(scope="module")
+def amber(browser, once) -> Iterator[Any]:
+    trouble: list[str] = []
+    made = opened(browser, written(AMBER, once), trouble)
+    made.done()
+    yield made
+    made.context.close()
+    assert trouble == []
+
+
+@pytest.fixture
+def page(amber) -> Iterator[Any]:
+    """One for all tests of a file: its values are put back behind each, what was undone is still known."""
+    yield amber
+    if amber.is_enabled('[data-do="reset"]'):
+        amber.does("reset")

@@ -2,25 +2,14 @@
 
 import json
 import math
-from collections.abc import Callable, Iterator
-from pathlib import Path
 
 import numpy as np
 import pytest
-from live_page import AMBER, Browser, Page, opened, written
+from live_page import AMBER, Page
 
 from actuator_lti.design import with_values
 from nonlinear import simulate
 from nonlinear.commands import Command, ramp, sampled, sine, step
-
-
-@pytest.fixture(scope="module")
-def page(browser: Browser, once: Callable[..., Path]) -> Iterator[Page]:
-    trouble: list[str] = []
-    made = opened(browser, written(AMBER, once), trouble)
-    yield made
-    made.context.close()
-    assert trouble == []
 
 
 def ask(page: Page, kind: str, **values: float) -> dict[str, float]:
@@ -61,7 +50,6 @@ def test_the_load_and_the_changed_design_are_in_the_run(page: Page) -> None:
     found = ask(page, "step", Size=4.0, Duration=0.05, Load=5.0)
     agree(found, step(math.radians(4.0)), 5.0, **{"control.position.gain": 80.0})
     ask(page, "step", Load=0.0)
-    page.does("reset")
 
 
 def test_a_step_of_a_drive_that_moves_is_that_of_the_simulator(page: Page) -> None:
@@ -155,4 +143,3 @@ def test_growth_of_an_unstable_drive_is_seen(page: Page) -> None:
     page.type_value("control.position.gain", gain)
     assert "unstable" in page.inner_text("table.now")
     assert last(page)["ticks"] > usual
-    page.does("reset")

@@ -64,8 +64,20 @@ def test_the_first_screen_is_one_screen_its_bars_to_scale_and_the_open_page_few(
         assert part == pytest.approx(bar["value"] / bar["limit"], rel=0.02)
 
 
-def test_a_link_opens_the_fold_that_it_leads_into(opens, built: Built) -> None:
+def test_keys_links_and_buttons_lead_to_what_they_say_and_put_folds_back(opens, built: Built) -> None:
     page = opens(built.page, **DESK)
+    page.keyboard.press("Tab")
+    assert page.evaluate("document.activeElement.className") == "skip"
+    page.keyboard.press("Enter")
+    assert page.evaluate("document.activeElement.id") == "content"
+    page.evaluate(
+        "window.seen = [];"
+        "window.print = () => seen.push(document.querySelectorAll('main details[open]').length); null"
+    )
+    for name in ("Print summary", "Print all"):
+        page.get_by_role("button", name=name).click()
+        page.evaluate("dispatchEvent(new Event('afterprint'))")
+    assert page.evaluate("seen") == [0, page.locator("main details").count()]
     assert page.locator("#limits figure").is_hidden()
     assert page.locator("#limits .result").is_visible()
     page.locator('.said a[href="#limits"]').click()
@@ -107,27 +119,6 @@ def test_paper_is_white_short_and_ends_no_page_with_a_heading(opens, built: Buil
         last = sheet.extract_text().strip().splitlines()[-1].strip()
         assert last not in titles
         assert last not in results
-
-
-def test_the_buttons_choose_what_is_printed_and_put_the_folds_back(opens, built: Built) -> None:
-    page = opens(built.page, **DESK)
-    page.evaluate(
-        "window.seen = [];"
-        "window.print = () => seen.push(document.querySelectorAll('main details[open]').length); null"
-    )
-    folds = page.locator("main details").count()
-    for name in ("Print summary", "Print all"):
-        page.get_by_role("button", name=name).click()
-        page.evaluate("dispatchEvent(new Event('afterprint'))")
-    assert page.evaluate("seen") == [0, folds]
-
-
-def test_the_keyboard_reaches_the_content(opens, built: Built) -> None:
-    page = opens(built.page)
-    page.keyboard.press("Tab")
-    assert page.evaluate("document.activeElement.className") == "skip"
-    page.keyboard.press("Enter")
-    assert page.evaluate("document.activeElement.id") == "content"
 
 
 @pytest.mark.skipif(not AXE.exists(), reason="axe-core is not installed: make page")

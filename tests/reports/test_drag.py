@@ -5,9 +5,10 @@ The truth is the axis: what lies between two places on a scale in dB is a factor
 
 import math
 import re
+from collections.abc import Iterator
 
 import pytest
-from live_page import AMBER, FIGURES, LIVE, Page, command_line
+from live_page import AMBER, FIGURES, LIVE, Page, command_line, opened, written
 
 from actuator_lti import load_design
 from actuator_lti.design import with_values
@@ -31,14 +32,24 @@ SCALE = """([chart, k]) => {
 }"""
 
 
-@pytest.fixture
-def page(opens) -> Page:
-    turn = 2.0 * math.pi
+@pytest.fixture(scope="module")
+def notched(browser, once) -> Iterator[Page]:
+    turn, trouble = 2.0 * math.pi, list[str]()
     notch = Filter(kind="notch", frequency_rad_s=turn * 200.0, width_rad_s=turn * 60.0, depth=0.3)
-    result = opens(changed(AMBER, controller={"velocity": {"filters": (notch,)}}))
-    result.settled(lambda: result.locator(".tabs button", has_text="Velocity").click())
-    result.locator('[data-chart="bode"]').scroll_into_view_if_needed()
-    return result
+    design = changed(AMBER, controller={"velocity": {"filters": (notch,)}})
+    made = opened(browser, written(design, once), trouble)
+    made.settled(lambda: made.locator(".tabs button", has_text="Velocity").click())
+    yield made
+    made.context.close()
+    assert trouble == []
+
+
+@pytest.fixture
+def page(notched: Page) -> Iterator[Page]:
+    notched.locator('[data-chart="bode"]').scroll_into_view_if_needed()
+    yield notched
+    if notched.is_enabled('[data-do="reset"]'):
+        notched.does("reset")
 
 
 def drag(page: Page, at: tuple[float, float], dx: float, dy: float) -> None:
@@ -63,8 +74,7 @@ def test_the_magnitude_is_dragged_by_decibels_and_undone_in_one_step(page: Page)
     assert by > 3.0
     assert page.field("control.velocity.gain") == pytest.approx(0.12 * 10.0 ** (by / 20.0), rel=2e-3)
     assert page.read()["velocity"]["gain_margin"] == pytest.approx(before["gain_margin"] - by, abs=0.02)
-    page.click('[data-do="undo"]')
-    page.wait_for_function("() => document.querySelector('[data-do=\"undo\"]').disabled")
+    page.does("undo")
     assert page.field("control.velocity.gain") == pytest.approx(0.12)
     assert page.read()["velocity"] == before
 

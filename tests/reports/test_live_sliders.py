@@ -115,42 +115,44 @@ def test_nonsense_is_not_taken(opens, page: Page) -> None:
     assert opens(AMBER, fragment=nonsense).read() == before
 
 
-def test_a_link_carries_the_changes(opens, page: Page) -> None:
-    page.type_value("control.position.gain", 175.0)
-    page.type_value("load.inertia", 3e-4)
-    page.click('[data-do="link"]')
-    link = page.input_value(".sheet textarea")
-    assert opens(AMBER, fragment="#" + link.split("#")[1]).read() == page.read()
+def test_a_link_carries_the_changes(opens, fresh: Page) -> None:
+    fresh.type_value("control.position.gain", 175.0)
+    fresh.type_value("load.inertia", 3e-4)
+    fresh.click('[data-do="link"]')
+    link = fresh.input_value(".sheet textarea")
+    assert opens(AMBER, fragment="#" + link.split("#")[1]).read() == fresh.read()
 
 
-def test_a_dropped_record_is_laid_over_the_model(page: Page) -> None:
+def test_a_dropped_record_is_laid_over_the_model(fresh: Page) -> None:
     """The record is a run of another gain: the model meets it once that gain is set; then it is removed."""
     made = simulate(with_values(AMBER, {"control.position.gain": 80.0}), step(math.radians(2.0)), 0.25)
     table = zip(made.time_s, np.degrees(made.reference_rad), np.degrees(made.output_angle_rad), strict=True)
     lines = ["time_s,command_deg,angle_deg", *(f"{t:.12g},{r:.12g},{y:.12g}" for t, r, y in table)]
 
-    def told(page: Page) -> str:
-        page.done()
-        return str(page.inner_text(".record"))
+    def told(fresh: Page) -> str:
+        fresh.done()
+        return str(fresh.inner_text(".record"))
 
-    page.settled(lambda: page.evaluate(DROP, ["bench.csv", "\n".join(lines)]))
-    words = told(page)
+    fresh.settled(lambda: fresh.evaluate(DROP, ["bench.csv", "\n".join(lines)]))
+    words = told(fresh)
     assert "bench.csv" in words
     assert float(words.split("as changed: ")[1].split(" %")[0].replace("×10", "e")) > 0.5
-    page.type_value("control.position.gain", 80.0)
-    words = told(page)
+    fresh.type_value("control.position.gain", 80.0)
+    words = told(fresh)
     assert float(words.split("as changed: ")[1].split(" %")[0].replace("−", "-")) < 1e-6
     assert "fit 100.0" in words
-    page.settled(lambda: page.get_by_label("Measured in").select_option("mrad"))
-    assert "fit 100.0" not in told(page)
-    page.settled(lambda: page.click(".dropped button"))
-    assert told(page) == ""
-    page.locator('[data-chart="run"] .keys li', has_text="record").wait_for(state="hidden")
-    page.evaluate(DROP, ["bench.png", "\0PNG"])
-    page.wait_for_function("() => document.querySelector('.record').innerText.includes('bench.png: no text')")
+    fresh.settled(lambda: fresh.get_by_label("Measured in").select_option("mrad"))
+    assert "fit 100.0" not in told(fresh)
+    fresh.settled(lambda: fresh.click(".dropped button"))
+    assert told(fresh) == ""
+    fresh.locator('[data-chart="run"] .keys li', has_text="record").wait_for(state="hidden")
+    fresh.evaluate(DROP, ["bench.png", "\0PNG"])
+    fresh.wait_for_function(
+        "() => document.querySelector('.record').innerText.includes('bench.png: no text')"
+    )
 
 
-def test_a_dropped_response_is_laid_over_the_loop(page: Page) -> None:
+def test_a_dropped_response_is_laid_over_the_loop(fresh: Page) -> None:
     """Measured as the closed loop 2 dB and 5 deg beside the model's own open loop, with its coherence."""
     model, hertz = assemble_loops(AMBER).velocity.open_loop, np.geomspace(2.0, 400.0, 40)
     open_loop = model(np.exp(2j * np.pi * hertz * model.dt)) * 10.0**0.1 * np.exp(1j * np.radians(5.0))
@@ -158,19 +160,19 @@ def test_a_dropped_response_is_laid_over_the_loop(page: Page) -> None:
     rows = zip(hertz, 20.0 * np.log10(abs(closed)), np.degrees(np.angle(closed)), strict=True)
     table = (f"{f:.15g};{m:.15g};{p:.15g};0.9" for f, m, p in rows)
     lines = ["frequency_Hz;mag_dB;phase_deg;coherence", *table]
-    page.settled(lambda: page.locator(".tabs button", has_text="Velocity").click())
-    page.settled(lambda: page.evaluate(DROP, ["sweep.csv", "\n".join(lines)]))
-    page.settled(lambda: page.get_by_label("of", exact=True).select_option("T"))
-    words = page.inner_text(".record .told")
+    fresh.settled(lambda: fresh.locator(".tabs button", has_text="Velocity").click())
+    fresh.settled(lambda: fresh.evaluate(DROP, ["sweep.csv", "\n".join(lines)]))
+    fresh.settled(lambda: fresh.get_by_label("of", exact=True).select_option("T"))
+    words = fresh.inner_text(".record .told")
     assert re.search(r"(?s)by coherence: 2\.00 dB rms, at most 2\.00.*5\.00 deg rms, at most 5\.00", words)
     for figure in ("bode", "nyquist"):
-        assert page.locator(f'[data-chart="{figure}"] .keys li', has_text="measured").is_visible()
-    assert page.locator('[data-chart="difference"]').is_visible()
-    page.type_value("control.velocity.gain", 0.12 * 10.0**0.1)
-    rest = page.inner_text(".record .told").split("coherence: ")[1].split(" dB rms")[0]
+        assert fresh.locator(f'[data-chart="{figure}"] .keys li', has_text="measured").is_visible()
+    assert fresh.locator('[data-chart="difference"]').is_visible()
+    fresh.type_value("control.velocity.gain", 0.12 * 10.0**0.1)
+    rest = fresh.inner_text(".record .told").split("coherence: ")[1].split(" dB rms")[0]
     assert float(rest.replace("−", "-")) < 1e-9
-    page.settled(lambda: page.click(".dropped button"))
-    assert page.locator('[data-chart="difference"]').is_hidden()
+    fresh.settled(lambda: fresh.click(".dropped button"))
+    assert fresh.locator('[data-chart="difference"]').is_hidden()
 
 
 def test_a_phone_has_the_sliders_within_its_width(opens) -> None:

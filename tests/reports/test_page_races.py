@@ -37,10 +37,10 @@ def at_once(page: Page, does: str) -> object:
     return page.evaluate(f"async () => {{ {HANDS} {does} }}")
 
 
-def test_done_is_said_of_the_values_that_are_asked_for(page: Page) -> None:
+def test_done_is_said_of_the_values_that_are_asked_for(fresh: Page) -> None:
     """However late the frame comes that follows them, and what was listed before is not taken up."""
     told = at_once(
-        page,
+        fresh,
         f"""let follow = null;
         window.requestAnimationFrame = (run) => {{ follow = run; return 1; }};
         type("{GAIN}", "110");
@@ -53,7 +53,7 @@ def test_done_is_said_of_the_values_that_are_asked_for(page: Page) -> None:
         return [first, then];""",
     )
     assert told == ["waits", "waits"]
-    page.done()
+    fresh.done()
 
 
 def test_a_value_that_is_refused_is_not_pinned_before_that_is_said(page: Page) -> None:
@@ -62,20 +62,20 @@ def test_a_value_that_is_refused_is_not_pinned_before_that_is_said(page: Page) -
     assert page.locator(".pins li").count() == 0
 
 
-def test_presses_within_one_frame_are_as_many_steps_as_they_do(page: Page) -> None:
+def test_presses_within_one_frame_are_as_many_steps_as_they_do(fresh: Page) -> None:
     """A fourth variant, a variant removed twice, one restored that is gone: no step and no complaint."""
-    at_once(page, 'for (let k = 0; k < 4; k++) press("pin"); await frame();')
-    assert page.locator(".pins li").count() == 3
-    at_once(page, 'for (const does of ["unpin", "unpin", "restore"]) press(does, "A"); await frame();')
-    assert page.locator(".pins li").count() == 2
-    assert at_once(page, 'for (let k = 0; k < 4; k++) press("undo"); await frame(); '
+    at_once(fresh, 'for (let k = 0; k < 4; k++) press("pin"); await frame();')
+    assert fresh.locator(".pins li").count() == 3
+    at_once(fresh, 'for (const does of ["unpin", "unpin", "restore"]) press(does, "A"); await frame();')
+    assert fresh.locator(".pins li").count() == 2
+    assert at_once(fresh, 'for (let k = 0; k < 4; k++) press("undo"); await frame(); '
                          'return find(\'[data-do="undo"]\').disabled;')  # fmt: skip
-    assert page.locator(".pins li").count() == 0
+    assert fresh.locator(".pins li").count() == 0
 
 
-def test_nothing_is_no_step(page: Page) -> None:
+def test_nothing_is_no_step(fresh: Page) -> None:
     does = f'type("{GAIN}", "120"); await frame(); await frame();'
-    assert at_once(page, does + "return find('[data-do=\"undo\"]').disabled;")
+    assert at_once(fresh, does + "return find('[data-do=\"undo\"]').disabled;")
 
 
 def test_a_move_under_way_is_reset(page: Page) -> None:
@@ -138,10 +138,10 @@ def test_the_map_waits_as_long_as_a_step_settles_though_that_follows_later(opens
     assert {cell[1] for cell in cells} == {math.ceil(1.5 * settling_s / (period_s * every)) * every}
 
 
-def test_the_file_dropped_last_is_laid_over_the_model(page: Page) -> None:
+def test_the_file_dropped_last_is_laid_over_the_model(fresh: Page) -> None:
     """The first is still read when the second comes."""
     at_once(
-        page,
+        fresh,
         """let read = null;
         const late = new Promise((go) => { read = go; });
         const table = "time_s,command_deg,angle_deg\\n0,1,0\\n0.1,1,1";
@@ -153,12 +153,12 @@ def test_the_file_dropped_last_is_laid_over_the_model(page: Page) -> None:
         read(table);
         await new Promise((go) => setTimeout(go, 0));""",
     )
-    assert {*re.findall(r"\w+\.csv", page.inner_text(".record"))} == {"second.csv"}
+    assert {*re.findall(r"\w+\.csv", fresh.inner_text(".record"))} == {"second.csv"}
 
 
-def test_a_playback_paused_and_gone_on_with_is_one(page: Page) -> None:
+def test_a_playback_paused_and_gone_on_with_is_one(fresh: Page) -> None:
     left = at_once(
-        page,
+        fresh,
         """const asked = new Set();
         const [ask, leave] = [requestAnimationFrame, cancelAnimationFrame].map((one) => one.bind(window));
         window.requestAnimationFrame = (run) => { const id = ask(run); asked.add(id); return id; };
@@ -169,18 +169,18 @@ def test_a_playback_paused_and_gone_on_with_is_one(page: Page) -> None:
     assert left == 1
 
 
-def test_a_handle_that_vanishes_is_let_go(page: Page) -> None:
+def test_a_handle_that_vanishes_is_let_go(fresh: Page) -> None:
     """Another loop is shown while the corner of this one is held: what was moved is a step of its own."""
-    page.locator('[data-chart="bode"]').scroll_into_view_if_needed()
-    page.settled(lambda: page.locator(".tabs button", has_text="Velocity").click())
-    x, y = page.spot('[data-chart="bode"] circle[data-name="corner of velocity"]')
-    page.mouse.move(x, y)
-    page.mouse.down()
-    page.settled(lambda: page.mouse.move(x + 15.0, y))
-    at_once(page, "find('.tabs [data-loop=\"position\"]').click();")
-    page.mouse.move(x + 16.0, y)
-    page.mouse.up()
-    page.wait_for_function("() => !document.querySelector('[data-do=\"undo\"]').disabled")
+    fresh.locator('[data-chart="bode"]').scroll_into_view_if_needed()
+    fresh.settled(lambda: fresh.locator(".tabs button", has_text="Velocity").click())
+    x, y = fresh.spot('[data-chart="bode"] circle[data-name="corner of velocity"]')
+    fresh.mouse.move(x, y)
+    fresh.mouse.down()
+    fresh.settled(lambda: fresh.mouse.move(x + 15.0, y))
+    at_once(fresh, "find('.tabs [data-loop=\"position\"]').click();")
+    fresh.mouse.move(x + 16.0, y)
+    fresh.mouse.up()
+    fresh.wait_for_function("() => !document.querySelector('[data-do=\"undo\"]').disabled")
 
 
 @pytest.mark.parametrize("between", ["", PAGE_UP])
@@ -222,12 +222,12 @@ def test_a_variant_s_figure_that_follows_later_is_not_said_before(opens) -> None
     assert "…" not in page.inner_text("table.variants")
 
 
-def test_what_waits_is_not_started_once_a_value_moves(page: Page) -> None:
+def test_what_waits_is_not_started_once_a_value_moves(fresh: Page) -> None:
     """Whatever is due when the next value comes was listed for the value before: it ran without its run."""
-    page.evaluate(SLOW)
-    page.type_value(GAIN, 101.0)  # by this clock its run took long: the next is late
+    fresh.evaluate(SLOW)
+    fresh.type_value(GAIN, 101.0)  # by this clock its run took long: the next is late
     at_once(
-        page,
+        fresh,
         f"""const wait = (ms) => new Promise((go) => setTimeout(go, ms));
         type("{GAIN}", "102");
         await wait(30); // listed, not started
