@@ -127,9 +127,6 @@ class _Body(Known):
         value = self.visit(node.value)
         return [ast.Expr(value)] if isinstance(value, ast.Call) else []
 
-    def visit_Pass(self, _node: ast.Pass) -> list[ast.stmt]:
-        return []
-
     # --- expressions -------------------------------------------------------------------------------
 
     def visit_Name(self, node: ast.Name) -> ast.expr:

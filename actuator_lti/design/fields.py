@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import MISSING, dataclass, fields, replace
+from functools import cache
 from typing import Any, Literal, get_args
 
 from actuator_lti.asked.quantities import LOOPS
@@ -101,6 +102,7 @@ TABLES: tuple[Section, ...] = (*SECTIONS, *RECORDS)
 BY_PATH: dict[str, Section] = {section.path: section for section in SECTIONS}
 
 
+@cache
 def children(path: str) -> tuple[Section, ...]:
     return tuple(section for section in SECTIONS if section.parent == path)
 
@@ -136,12 +138,10 @@ def at_place(design: model.Design, place: str) -> Any:
 
 
 def part_at(design: model.Design, path: str) -> Any:
-    """The part that a table's dotted path names; None if the design has none, KeyError if no table can."""
+    """The part that a table's dotted path names; None if the design has none."""
     if path in BY_PATH and not BY_PATH[path].many:
         return at_place(design, BY_PATH[path].place)
     section = BY_PATH[path.rpartition(".")[0]]
-    if not section.many:
-        raise KeyError(path)
     return next((item for one, item in section.items(design) if one == path), None)
 
 

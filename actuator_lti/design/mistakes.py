@@ -129,7 +129,8 @@ class Findings:
 
 
 def meant_of(word: str, known: Iterable[str]) -> str:
-    return next(iter(get_close_matches(word, list(known), 1, 0.65)), "")
+    every = list(known)
+    return word if word in every else next(iter(get_close_matches(word, every, 1, 0.65)), "")
 
 
 def nearest(word: str, known: Iterable[str]) -> str:

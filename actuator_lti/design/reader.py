@@ -321,7 +321,8 @@ class Reader:
         return int(value) if field.kind == "integer" else value
 
     def limit(self, quantity: Any, raw: Any, path: str) -> Any:
-        near = get_close_matches(f"{quantity}", QUANTITIES, 1, _VERY_NEAR)
+        exact = [quantity] if isinstance(quantity, str) and quantity in QUANTITIES else []
+        near = exact or get_close_matches(f"{quantity}", QUANTITIES, 1, _VERY_NEAR)
         known = QUANTITIES[near[0]] if near else None
         if isinstance(raw, bool) or not isinstance(raw, str | int | float):
             return self.refuse(path, raw, "allowed: a number with its unit, as text")

@@ -1,6 +1,7 @@
 """How data sheets write numbers and units: each spelling becomes a number and a product of names."""
 
 import re
+from functools import lru_cache
 from math import isfinite, nan
 
 from actuator_lti.files.reading import shown
@@ -95,6 +96,7 @@ def _alone(text: str) -> str:
     return text
 
 
+@lru_cache(maxsize=1024)
 def split_quantity(text: str) -> tuple[float, str]:
     """Number and unit of a written quantity; ``43:1``, ``i = 8`` and ``17 bit`` are numbers without one."""
     if len(text) > LONGEST:

@@ -33,8 +33,6 @@ def in_double_precision() -> Iterator[None]:
 
 def error_bound(loop: RationalLoop, x: Real) -> Real:
     """Relative error of L that one rounding of each entry makes, at arguments of its slopes."""
-    if not x.size:
-        return np.empty(0)
     points = loop.point(x)
     if loop.coefficients is None:
         return _of_states(loop, points)

@@ -3,7 +3,7 @@
 from bisect import bisect_left
 from dataclasses import dataclass, replace
 from functools import cached_property
-from math import exp, inf, isfinite, log, pi, sqrt
+from math import ceil, exp, inf, isfinite, log, pi, sqrt
 
 import numpy as np
 
@@ -12,13 +12,16 @@ from actuator_lti.design.loader import AnyDesign, as_design
 from actuator_lti.design.model import Design
 from actuator_lti.drive.operating import follows_angle, runs
 from actuator_lti.drive.steady import winding
-from actuator_lti.errors import InputError
+from actuator_lti.errors import InputError, NumericalError
 from actuator_lti.types import Floats
 from analyses.duty.asked import Asked
 from analyses.failures.cases import jammed
+from analyses.motion.settling import pole_sizes
 from analyses.specification.requirements import RequirementVerdict, judged_by, tally
-from nonlinear import Trajectory, commands, simulate
+from nonlinear import commands, simulate
+from nonlinear.runs.running import Piece
 from nonlinear.runs.setup import check_frequency
+from nonlinear.runs.trajectory import ADVICE
 
 
 @dataclass(frozen=True)
@@ -58,6 +61,7 @@ class Duty:
     fed_back_W: float
     time_s: Floats  # one period of the steady motion, or several where the load turns with it
     current_A: Floats
+    steady: bool  # whether it is; else the longest motion that is followed ends before
     overload: Overload | None  # none without protection; none without a thermal resistance
     heating: Heating | None
 
@@ -100,6 +104,8 @@ class Duty:
     @property
     def rated(self) -> Verdict:
         """Whether the drive may do this for ever by what is stated: current, protection, temperature."""
+        if not self.steady:
+            return Verdict.NOT_PROVEN
         stated = [self.rms_A <= self.continuous_A] if isfinite(self.continuous_A) else []
         if self.heating is not None and isfinite(self.heating.limit_degC):
             stated.append(self.heating.final_degC <= self.heating.limit_degC)
@@ -112,6 +118,8 @@ PERIODS, MANY = 3, 32  # of the motion that pass at least before one is taken; t
 STEADY = 1e-4  # of the rms current: it differs by less, in no printed digit, after twice as many periods
 HOLD_S = 1.0
 MOST_TICKS = 2_000_000
+MOST_WAITED = 10 * MOST_TICKS  # some seconds
+AT_REST = 1e-9  # a pole this near to 1 is one of what nothing moves
 MOST_CYCLES = 2**40
 _DRAWN = 200
 
@@ -137,8 +145,9 @@ def duty(design: AnyDesign, asked: Asked | None = None) -> Duty:
     asked = Asked.of(design) if asked is None else asked
     there = jammed(design) if design.controller.outermost == "current" else design
     free = replace(there, limits=replace(design.limits, peak_time_s=None))
-    run, ticks = _moving(free, asked)
-    current, still = run.current_A[-ticks:], np.zeros(1)
+    piece, ticks, steady = _moving(free, asked)
+    current, speed = piece.signal("current_A").copy(), piece.signal("motor_speed_rad_s")
+    still = np.zeros(1)
     if asked.share < 1.0:
         resting = simulate(free, commands.hold(), HOLD_S, asked.load_Nm).current_A
         still = resting[resting.size // 2 :]
@@ -149,22 +158,25 @@ def duty(design: AnyDesign, asked: Asked | None = None) -> Duty:
 
     moving, held = sqrt(mean(current**2)), float(np.sqrt(np.mean(still**2)))
     R, _, kE = winding(design.effective_motor)
-    shaft = kE * current * run.motor_speed_rad_s[-ticks:]
+    shaft = kE * current * speed
     power = R * current**2 + shaft
     peak = max(float(np.abs(part).max()) for part in (current, still))
     rms = float(np.sqrt(asked.share * moving**2 + (1.0 - asked.share) * held**2))
-    acts = [name for name in run.limits if run.limit_active(name)[-ticks:].any()]
     return Duty(
         design, asked, rms, moving, held, peak,
-        design.limits.continuous_current_A, tuple(acts),
+        design.limits.continuous_current_A, piece.limited,
         asked.share * mean(shaft), float(power.max()), max(0.0, -float(power.min())),
-        run.time_s[:ticks].copy(), current.copy(),
+        design.controller.period_s * np.arange(ticks, dtype=float), current, steady,
         _overload(design, asked, current, held), heating(design, rms),
     )  # fmt: skip
 
 
-def _moving(design: Design, asked: Asked) -> tuple[Trajectory, int]:
-    """The motion until it is steady, or as long as it may be, and the ticks of the periods that are taken."""
+def _moving(design: Design, asked: Asked) -> tuple[Piece, int, bool]:
+    """The periods that are taken of the motion, their ticks, and whether it is steady.
+
+    That is where the slowest pole has fallen to `STEADY` and, with all that is not linear, the rms current is
+    the same after twice as long.
+    """
     Ts, size = design.controller.period_s, asked.size_of(design)
     every = round(design.controller.period_of(design.controller.outermost) / Ts)
     lowest = (PERIODS + 1) / (MOST_TICKS * Ts)
@@ -175,17 +187,22 @@ def _moving(design: Design, asked: Asked) -> tuple[Trajectory, int]:
     taken = _periods(design, asked, max(1, MOST_TICKS // ticks - PERIODS)) * ticks
     sine = commands.sine(size, 1.0 / (ticks * Ts))
     check_frequency(design, replace(sine, highest_hz=max(asked.frequency_hz, sine.highest_hz)))
-    waited, before = PERIODS * ticks, inf
+    command = sine if asked.ramp_s == 0.0 else _trapezoid(asked, size, np.arange(0, taken, every), Ts, ticks)
+    drive = simulate(design, command, taken * Ts, asked.load_Nm).running
+    assert drive is not None
+    sizes, gone, before = pole_sizes(design), 0, inf
+    slowest = float(sizes[sizes < 1.0 - AT_REST].max(initial=0.0))
+    wait = max(PERIODS * ticks, ceil(log(STEADY) / log(slowest)) if slowest > 0.0 else 0)
     while True:
-        whole = waited + taken
-        command = (
-            sine if asked.ramp_s == 0.0 else _trapezoid(asked, size, np.arange(0, whole, every), Ts, ticks)
-        )
-        run = simulate(design, command, whole * Ts, asked.load_Nm)
-        rms = float(np.sqrt(np.mean(run.current_A[-taken:] ** 2)))
-        if abs(rms - before) <= STEADY * rms or whole + waited > MOST_TICKS:
-            return run, taken
-        waited, before = 2 * waited, rms
+        while gone < min(wait, MOST_WAITED):
+            piece, gone = drive.advance(taken), gone + taken
+            if piece.status != "ok":
+                raise NumericalError(f"duty ({piece.status}): {ADVICE[piece.status]}")
+        rms = float(np.sqrt(np.mean(piece.signal("current_A") ** 2)))
+        steady = abs(rms - before) <= STEADY * rms
+        if steady or wait >= MOST_WAITED:
+            return piece, taken, steady
+        wait, before = 2 * gone, rms
 
 
 def _trapezoid(asked: Asked, size: float, at: Floats, Ts: float, ticks: int) -> commands.Command:

@@ -11,12 +11,10 @@ from actuator_lti.design.loader import AnyDesign, as_design
 from actuator_lti.design.model import Design
 from actuator_lti.drive.operating import follows_angle, runs, straight
 from actuator_lti.errors import InputError, NumericalError, UnstableError
-from actuator_lti.loops import assemble_loops
-from actuator_lti.loops.stiffness import compliance
 from actuator_lti.types import Floats
 from analyses.failures.asked import Asked
 from analyses.failures.cases import Case, Rig, cases_of
-from analyses.motion.settling import Settling, counted, outcome, settle
+from analyses.motion.settling import Settling, counted, outcome, pole_sizes, settle
 from analyses.specification.capability import drive_figures
 from analyses.specification.requirements import RequirementVerdict, judged_by, tally
 from nonlinear.runs.trajectory import ADVICE
@@ -160,12 +158,7 @@ def _hold(rig: Rig, start: float, wait: int, most: int, swing: float) -> None:
 
 def _settling_s(design: Design, asked: Asked) -> float:
     """Time to reach half the stop, or the speed before, and settle."""
-    # A load torque that does not reach the motor shows none of the poles by which the command is followed;
-    # what passes as a drive turns makes none unstable
-    there = design if design.controller.position is not None else straight(design)
-    followed, period = assemble_loops(there).plain_response, design.controller.period_s
-    updates = [] if followed is None else np.abs(followed.poles()) ** (period / followed.dt)
-    slowest = max(float(compliance(there).slowest), *updates)
+    slowest, period = float(pole_sizes(design).max()), design.controller.period_s
     if slowest > 1.0 + 1e-9:
         raise UnstableError("failures: the closed loop is not stable")
     figures = drive_figures(design)

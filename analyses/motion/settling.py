@@ -11,8 +11,11 @@ from actuator_lti.asked.quantities import QUANTITIES
 from actuator_lti.asked.verdict import Verdict
 from actuator_lti.design.checks import CHECKS
 from actuator_lti.design.model import Design, Requirement, Waiver
+from actuator_lti.drive.operating import straight
 from actuator_lti.files.reading import Tree
-from actuator_lti.loops import Loops
+from actuator_lti.loops import Loops, assemble_loops
+from actuator_lti.loops.stiffness import compliance
+from actuator_lti.types import Floats
 from analyses.large_signal.tones import TANH_TOLERANCE, full_command
 from analyses.limit_cycles.stick_slip import stick_slip_cycle
 from nonlinear.rows import Rows
@@ -48,6 +51,18 @@ class Settling:
         """The swing that it ends in: 0 at rest, inf where it diverges, ``None`` where it still moves."""
         known = {"at rest": 0.0, "diverging": inf, "still moving": None}
         return known.get(self.rest.verdict, self.swing_rad)
+
+
+def pole_sizes(design: Design) -> Floats:
+    """Magnitudes, per tick, of the poles by which the command and a load are followed.
+
+    A load torque that does not reach the motor shows none of the poles by which the command is followed; what
+    passes as a drive turns makes none unstable.
+    """
+    there = design if design.controller.position is not None else straight(design)
+    followed, period = assemble_loops(there).plain_response, design.controller.period_s
+    updates = [] if followed is None else np.abs(followed.poles()) ** (period / followed.dt)
+    return np.append(updates, float(compliance(there).slowest))
 
 
 def counted(rest: Rest, least: float) -> Rest:

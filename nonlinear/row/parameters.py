@@ -9,6 +9,7 @@ import numpy as np
 from actuator_lti.design.law import LAW_INPUTS, twist_of
 from actuator_lti.design.model import AntiWindup, CurrentLoop, Design, FilterPlace, SpeedSource, VelocityLoop
 from actuator_lti.design.over_angle import OverAngle
+from actuator_lti.design.plant import torque_per_command
 from actuator_lti.drive.signals import LIMITERS
 from actuator_lti.errors import InputError
 from actuator_lti.types import Floats
@@ -241,19 +242,12 @@ def _position(design: Design, row: Floats) -> None:
     row[at.DERIVATIVE_COEFFICIENT] = T / (loop.derivative_filter_s + T)
     row[at.FRICTION_FEEDFORWARD] = loop.friction_feedforward
     row[at.ACCELERATION_FEEDFORWARD] = (
-        loop.acceleration_feedforward * row[at.INERTIA] / (_torque_gain(design, row) * T**2)
+        loop.acceleration_feedforward * row[at.INERTIA] / (torque_per_command(design) * T**2)
     )
     if loop.sensor == "output":
         row[at.OUTPUT_SENSOR] = 1.0
         quantum = design.output_quantum_rad
         row[at.POSITION_COUNTS] = 0.0 if quantum is None else 1.0 / quantum
-
-
-def _torque_gain(design: Design, row: Floats) -> Floats:
-    """Torque per unit of what the position or velocity loop commands: A, or V at standstill."""
-    if not design.motor.has_electrical_dynamics:
-        return row[at.SOURCE_GAIN]
-    return row[at.TORQUE_CONSTANT] / (row[at.RESISTANCE] if design.controller.current is None else 1.0)
 
 
 def _encoder(design: Design, row: Floats, period_s: Any) -> None:

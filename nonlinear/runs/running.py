@@ -41,6 +41,12 @@ class Piece:
         """A signal by its name in a run; those of probes have none here."""
         return self.columns[at.SIGNALS[: at.BASE_SIGNALS].index(name)]
 
+    @property
+    def limited(self) -> tuple[str, ...]:
+        """Limiters that acted within it."""
+        bits = zip(at.LIMITERS, at.LIMITER_BITS, strict=True)
+        return tuple(name for name, bit in bits if (self.flags & bit).any())
+
 
 @dataclass(eq=False)
 class Running:
@@ -149,8 +155,8 @@ class Running:
             state[:] = s
 
     def advance(self, ticks: int, every: int = 1) -> Piece:
-        """Go on by some ticks from tick 0, and be at tick 0 again."""
-        p = self.p
+        """Go on by some ticks, command and load as they are from tick 0 on, and be at tick 0 again."""
+        p, self.s[at.S_TICK] = self.p, 0.0
         p[at.TICKS], p[at.RECORD_EVERY], p[at.WINDOW], p[at.STEP_TARGET] = ticks, every, 0.0, 0.0
         history, flags, out = self.history()
         before, steps = self.s[at.S_EVENTS], self.s[at.S_STEPS]

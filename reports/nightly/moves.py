@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from actuator_lti.asked.quantities import LOOP_QUANTITIES, QUANTITIES
+from actuator_lti.design.units import parse_unit
 from actuator_lti.errors import InputError
 from analyses.records.single_rows import NORMAL
 from reports.nightly.figures import Figure
@@ -34,6 +35,7 @@ class Rule:
     pattern: str
     absolute: float
     relative: float
+    unit: str = ""  # of ``absolute``; empty: that of the figure
 
 
 @dataclass(frozen=True)
@@ -48,7 +50,7 @@ class Tolerances:
             return 0.5, 0.0
         for rule in self.rules:
             if fnmatch.fnmatchcase(figure.name.lower(), rule.pattern.lower()):
-                return rule.absolute, rule.relative
+                return rule.absolute * _turned(rule.unit or figure.unit, figure.unit), rule.relative
         quantity = _BY_HEADING.get(figure.name.rpartition(" / ")[2])
         if quantity is None:
             return _BY_UNIT.get(figure.unit, FLOOR), RELATIVE
@@ -57,11 +59,20 @@ class Tolerances:
         return quantity.tolerance * scale or FLOOR, RELATIVE
 
 
+def _turned(unit: str, own: str) -> float:
+    """What one of a tolerance's unit is in that of a figure; 1 where it is none of its kind (dB, samples)."""
+    try:
+        stated, shown = parse_unit(unit), parse_unit(own)
+    except ValueError:
+        return 1.0
+    return stated.factor / shown.factor if stated.dimension == shown.dimension else 1.0
+
+
 def read_tolerances(table: Mapping[str, object], where: str) -> Tolerances:
     """Read ``{"*phase_margin*" = "0.5 deg", "*bandwidth*" = "1 %"}``; a bare number is in the figure's unit.
 
     >>> read_tolerances({"*bandwidth*": "1 %"}, "study.toml").rules
-    (Rule(pattern='*bandwidth*', absolute=0.0, relative=0.01),)
+    (Rule(pattern='*bandwidth*', absolute=0.0, relative=0.01, unit=''),)
     """
     if len(table) > MAX_RULES:
         raise InputError(f"tolerance: {len(table)} rules: at most {MAX_RULES} are allowed", where=where)
@@ -80,7 +91,7 @@ def _rule(pattern: str, value: object, where: str) -> Rule:
         raise InputError(f"{said}: write a number of at least 0 and its unit, or a percentage", where)
     if unit.strip() == "%" or digits.endswith("%"):
         return Rule(pattern, 0.0, amount / 100.0)
-    return Rule(pattern, amount, 0.0)
+    return Rule(pattern, amount, 0.0, unit.strip())
 
 
 # ---- over the nights -------------------------------------------------------------------------------------

@@ -25,6 +25,8 @@ def section(result: Duty) -> doc.Section:
     note = f"Duty: {asked_words(result)}."
     if runs(result.design) and follows_angle(result.design) and result.asked.share < 1.0:
         note += " The load turns with the drive: this is one motion of many, which begin at other angles."
+    if not result.steady:
+        note += " The motion is not steady where its simulation ends: it is not judged."
     if result.heating is None:
         note += " No winding temperature: the design states no temperature.thermal_resistance."
     if result.overload is None:

@@ -625,7 +625,7 @@ def test_speed_and_force_of_a_linear_axis_behind_gears_are_those_of_the_output()
 
 
 @pytest.mark.parametrize(("key", "stated", "half", "words"), [
-    ("motor.rotor_inertia", "9.2 g*cm^2", 4.6e-7, "4.6 g cm^2"),
+    ("motor.rotor_inertia", "9.2 g*cm^2", 4.6e-7, "4.6 g cm²"),
     ("friction.breakaway_ratio", "2", 1.0, "1"),
     ("motor.back_emf_constant", "1618.5 rpm/V", 0.00295, "0.00295 V s/rad"),  # half of it is twice the rpm/V
 ])  # fmt: skip

@@ -73,7 +73,7 @@ def _driven(command: np.ndarray, noise: np.ndarray) -> np.ndarray:
 
 
 def _record(
-    hold: int, noise: float, seed: int, every: float = EVERY, late: int = 0, rows: int = 4000
+    hold: int, noise: float, seed: int, every: float = EVERY, late: int = 0, rows: int = 2000
 ) -> Record:
     """A row of every tenth tick; noise in the loops, in shares of 600 rad/s and 150 mA.
 

@@ -84,7 +84,9 @@ def test_plan_and_surface_are_those_of_the_paper(runs: tuple[TrueRun, ...]) -> N
         assert torque == pytest.approx(float(TABLE_1 @ point), rel=2e-3)
 
 
-def test_the_intervals_cover_the_true_values(design: Design, runs: tuple[TrueRun, ...]) -> None:
+def test_the_intervals_cover_the_true_values(design, runs, monkeypatch: pytest.MonkeyPatch) -> None:
+    # whether a run contradicts its drive is asked of files, and takes three quarters of the time
+    monkeypatch.setattr("analyses.identification.campaign.check_run", lambda *_: ())
     covered = np.zeros(3, dtype=int)
     for seed in range(100):
         fit = identify_campaign(_imported(runs, seed), design, richer=False).fit

@@ -19,6 +19,7 @@ from actuator_lti.drive.steady import torque_gain_Nm_rad
 from analyses import survey_loops, validate
 from analyses.linear.code_check import check_code
 from analyses.tuning.start import rule_gains
+from analyses.validation import CHECKS, QUICK
 from reports.live.keys import followed
 from reports.live.model import live_model
 
@@ -116,7 +117,7 @@ def lead(stage: str) -> Design:
 @pytest.mark.parametrize("stage", STAGES)
 def test_every_prediction_is_met(stage: str) -> None:
     """By the simulator's own derivative, in time, and beyond the limits."""
-    result = validate(lead(stage))
+    result = validate(lead(stage), QUICK)
     assert result.passed, [row for row in result.rows if row.verdict != "met"]
     assert len(result.rows) > 60
 
@@ -126,7 +127,7 @@ def test_a_law_on_a_counted_output_meets_its_predictions() -> None:
     base = load_design("joint")
     gain, T = base.controller.position.gain, base.controller.period_of("position")
     law = ([[0.5]], [[0.1 * gain, 0.2]], [[0.5]], [[0.9 * gain, -3.0]], T)
-    rows = validate(base.with_law("position", law, ["error", "twist"])).rows
+    rows = validate(base.with_law("position", law, ["error", "twist"]), CHECKS).rows
     assert not [row for row in rows if row.verdict != "met"]
 
 

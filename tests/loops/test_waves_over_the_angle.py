@@ -76,12 +76,6 @@ def test_at_every_instant_it_is_a_spring_that_keeps_its_energy(case: Case) -> No
 
 
 @each
-def test_a_drive_in_motion_feels_its_mean_which_is_none(case: Case) -> None:
-    own, plain = (tick(one, speed_rad_s=40.0, angle_rad=0.3).A for one in (case.put(rotor()), rotor()))
-    assert np.array_equal(own, plain)
-
-
-@each
 def test_a_speed_drive_is_one_in_motion_but_at_rest(case: Case) -> None:
     """A P loop against viscous friction has Kp/(Kp + Cv) at DC as it runs, none in a notch."""
     plain = rotor(viscous=1e-3)

@@ -173,6 +173,9 @@ def test_quantities_have_one_tolerance_a_unit_and_a_rule_of_the_study_comes_firs
     for value in ("-1 deg", "much", "nan", True, [1]):
         refused(read_tolerances, {"x": value}, "study.toml", words="study.toml: tolerance 'x'")
     assert read_tolerances({"*gain margin": "0.5 dB"}, "study.toml").pair(figure) == (0.5, 0.0)
+    late = Figure(name="Rise time", value=23.0, unit="ms")
+    assert read_tolerances({"rise*": "0.5 s"}, "study.toml").pair(late) == (500.0, 0.0)  # was 0.5 ms
+    assert read_tolerances({"rise*": 0.5}, "study.toml").pair(late) == (0.5, 0.0)
     assert Tolerances().pair(Figure(name="x: met", value=1.0, kind="verdict")) == (0.5, 0.0)
 
 

@@ -1,5 +1,6 @@
 """The judge of rest, against closed forms, plain long runs, and drives described in words."""
 
+import sys
 from collections.abc import Iterable
 from pathlib import Path
 
@@ -277,7 +278,7 @@ def test_all_who_ask_get_one_answer(seed: int, monkeypatch: pytest.MonkeyPatch) 
     """`cycles`, `validate`, `failures`, `simulate` after two lengths; the words of the report."""
     design = stable_position_drive(seed)
     # what large commands make of it is another question, and half the time
-    monkeypatch.setattr("analyses.validation.validate.conditional_stability", lambda *_: None)
+    monkeypatch.setattr(sys.modules["analyses.validation.validate"], "conditional_stability", lambda *_: None)
     waited, checked = limit_cycles(design), validate(design, QUICK)
     assert checked.settlings == waited.rests
     assert (waited.verdict, waited.hunting) == (checked.rest, checked.hunting)

@@ -10,6 +10,7 @@ import pytest
 
 from actuator_lti import load_design
 from actuator_lti.asked.verdict import Verdict
+from actuator_lti.design import with_overrides
 from analyses.comparison.variants import Comparison, compare
 from analyses.slugs import slug
 from analyses.specification.requirements import RequirementVerdict
@@ -20,6 +21,7 @@ from reports import document as doc
 from reports.sections.compare import brief
 from reports.sections.compare import section as sections
 from reports.sections.compare_best import MANY, choice, nearness, table_text
+from reports.terminal import print_blocks
 from reports.verdict_summary import verdict_of
 
 COUNT = 3_000
@@ -133,14 +135,25 @@ def test_an_unstable_variant_has_no_margins_is_named_so_and_is_the_worst(tmp_pat
     assert (row["unstable"], row["room_percent"], row["position.phase_margin [deg]"]) == ("position", "", "")
 
 
+@pytest.fixture(scope="module")
+def of_joint() -> tuple[list[str], Comparison]:
+    """The joint and six changes of one key, by their names."""
+    base = load_design("joint")
+    keys = [("control.position.gain", f"{k} 1/s") for k in (7, 9, 10, 11, 12)] + [("limits.voltage", "47 V")]
+    changed = [(f"{key}={value}", with_overrides(base, {key: value})) for key, value in keys]
+    variants = tuple(Variant(name, slug(name), design, {}) for name, design in changed)
+    found = compare(replace(study_of(base), variants=variants), validation=False)
+    return [name for name, _ in changed], found
+
+
 @pytest.mark.parametrize("columns", [60, 140])
-def test_the_terminal_shows_every_design_by_its_own_name(columns, cli, monkeypatch, tmp_path) -> None:
+def test_the_terminal_shows_every_design_by_its_own_name(columns, of_joint, capsys, monkeypatch) -> None:
     monkeypatch.setenv("COLUMNS", str(columns))
-    gains = [f"control.position.gain={k} 1/s" for k in (7, 9, 10, 11, 12)] + ["limits.voltage=47 V"]
-    sets = [word for gain in gains for word in ("--set", gain)]
-    out = cli.text("compare", "joint", *sets, "--no-validate", "--out", tmp_path, status=1)
+    names, found = of_joint
+    print_blocks(brief(found).blocks)
+    out = capsys.readouterr().out
     loops = " ".join(out.partition("Loops")[2].split())
     assert "Loops, continued" in loops
     assert all("joint" in part for part in loops.split("Loops, continued"))  # the base, in each of them
-    assert [gain for gain in gains if gain.rpartition("=")[2].split()[0] not in loops] == []
+    assert [name for name in names if name.rpartition("=")[2].split()[0] not in loops] == []
     assert "47 v" not in loops

@@ -116,7 +116,7 @@ def test_torque_and_back_emf_constant_move_by_one_factor(tmp_path, toleranced) -
     wide = {path: Tolerance(kind="uniform", text="20 %", half_width=0.2 * base.parameters[path].value)
             for path in toleranced}  # fmt: skip
     kept = {path: replace(one, tolerance=wide.get(path)) for path, one in base.parameters.items()}
-    design = read_design_text(write_design(replace(base, parameters=kept)))
+    design = read_design_text(write_design(asked_twice(replace(base, parameters=kept))))
     study = monte_carlo(design, tmp_path, MonteCarloSettings(samples=64))
     made = [replay(design, sampler_of(design), k) for k in range(8)]
     made += [load_design(case.file) for case in study.worst]

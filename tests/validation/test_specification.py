@@ -7,6 +7,7 @@ from math import ceil, inf
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from scipy.optimize import brentq
 from scipy.signal import lfilter
 
 from actuator_lti import load_design
@@ -19,7 +20,7 @@ from analyses.friction_effects import friction_effects
 from analyses.large_signal import large_signals
 from analyses.specification import Specification, specification
 from analyses.specification.capability import drive_figures, thermal_duty, torque_speed_plane
-from nonlinear import commands, simulate
+from nonlinear import Trajectory, commands, simulate
 from nonlinear.bench.operating_motion import on_the_bench
 from reports import document as doc
 from reports.charts.svg import draw_svg
@@ -189,6 +190,26 @@ def test_the_motion_is_followed_until_a_slow_integral_carries_the_load(
     result = duty(design, Asked.of(design, amplitude_rad=0.1, frequency_hz=5.0, load_Nm=load))
     long = simulate(design, commands.sine(0.1, 5.0), 40.0 * integral_s, load).current_A[-len(result.time_s) :]
     assert result.rms_A == pytest.approx(np.sqrt(np.mean(long**2)), rel=5e-4)
+
+
+def test_a_slow_integral_is_waited_for_or_the_duty_is_not_judged(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As slow as that it is a constant at 5 Hz: the one with which the mean error is zero."""
+    design, sine = changed(FIN, controller={"position": {"integral_time_s": 100.0}}), commands.sine(0.1, 5.0)
+    asked = Asked.of(design, amplitude_rad=0.1, frequency_hz=5.0, load_Nm=4.0)
+    result, ticks = duty(design, asked), round(0.2 / design.controller.period_s)
+
+    def run(bias: float) -> Trajectory:
+        return simulate(FIN, sine, 2.0, 4.0, bias=commands.hold(bias))
+
+    def error(bias: float) -> float:
+        return float(np.mean(run(bias).output_angle_rad[-ticks:]))
+
+    held = run(brentq(error, -0.1, 0.1)).current_A[-ticks:]
+    assert result.steady
+    assert result.rms_A == pytest.approx(np.sqrt(np.mean(held**2)), rel=5e-4)
+    monkeypatch.setattr("analyses.duty.run.MOST_WAITED", 10 * ticks)
+    short = duty(design, asked)
+    assert (short.steady, short.rated) == (False, Verdict.NOT_PROVEN)
 
 
 @pytest.mark.parametrize(("share", "cycle_s"), [(0.4, 3.0), (0.4, 40.0), (1.0, 1.0)])
