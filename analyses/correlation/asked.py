@@ -30,9 +30,7 @@ class Asked:
     Try: actuator-lti correlate emps DATA_EMPS.mat
     """
 
-    records: Annotated[
-        list[Path], Option("Records: CSV, .mat, or record files (TOML).", "RECORD...", argument=True)
-    ]
+    records: Annotated[list[Path], Option("CSV, .mat, or record files (TOML).", "RECORD...", argument=True)]
     command: Annotated[
         str | None,
         Option(

@@ -87,10 +87,10 @@ def correlate_record(
         known = ", ".join(AXIS_SIGNALS[design.axis])
         raise InputError(f"nothing to compare; known signals: {known}", where=record.name)
     with because({record.name: findings}):
-        modelled, limits = model_signals(design, record, measured, notes, progress, command=command)
+        driven, run, series = nearest_run(design, record, measured, progress, command)
+    modelled = {name: series[name] for name in measured}
     if (follows := followed(design, record, modelled, command)) is not None:
         findings += (following_finding(design, follows),)
-    driven = driving.needed_command(design, record, command)
     outermost = driven.stage == design.controller.outermost
     used = dict.fromkeys(measured, "compared") | {LOADS[design.axis]: "load", "enable": "enabled part"}
     used[driven.signal] = "command" if outermost else f"{driven.stage} command"
@@ -104,8 +104,8 @@ def correlate_record(
         record=record.name,
         design=design.name,
         signals=signals,
-        limits=limits,
-        notes=tuple(notes),
+        limits={name: use.fraction for name, use in run.limits.items()},
+        notes=(*notes, *driven.notes),
         counts=str(record.counts),
         sha256=record.sha256,
         source=record,
@@ -140,23 +140,13 @@ def measured_signals(
     return result
 
 
-def model_signals(
-    design: Design,
-    record: Record,
-    measured: Mapping[str, Floats],
-    notes: list[str] | None = None,
-    progress: Progress = None,
-    *,
-    command: str | None = None,
-) -> tuple[dict[str, Floats], dict[str, float]]:
-    """The model's signals at a regular record's times, and the limiters' shares of the time.
+def model_signals(design: Design, record: Record, measured: Mapping[str, Floats]) -> dict[str, Floats]:
+    """The model's signals at a regular record's times.
 
-    ``measured`` are the signals wanted; the simulation starts from what their first samples show. What was
-    done is added to ``notes``.
+    ``measured`` are the signals wanted; the simulation starts from what their first samples show.
     """
-    _, made, series = _nearest(design, record, measured, [] if notes is None else notes, progress, command)
-    limits = {name: use.fraction for name, use in made.limits.items()}
-    return {name: series[name] for name in measured}, limits
+    series = nearest_run(design, record, measured)[2]
+    return {name: series[name] for name in measured}
 
 
 def as_driven(design: Design, record: Record) -> Record:
@@ -164,7 +154,7 @@ def as_driven(design: Design, record: Record) -> Record:
 
     It stays so whatever drive is simulated with it: in a search each would have its steps where they suit it.
     """
-    driven, *_ = _nearest(design, record, measured_signals(design, record), [])
+    driven, *_ = nearest_run(design, record, measured_signals(design, record))
     early = np.full(len(record), np.nan)
     early[driven.steps] = driven.early_s
     return replace(record, between=driven.between, early_s=early)
@@ -173,21 +163,17 @@ def as_driven(design: Design, record: Record) -> Record:
 _Modelled = tuple[driving.Driven, Trajectory, dict[str, Floats]]
 
 
-def _nearest(
+def nearest_run(
     design: Design,
     record: Record,
     measured: Mapping[str, Floats],
-    notes: list[str],
     progress: Progress = None,
     command: str | None = None,
 ) -> _Modelled:
-    """The reading of a command with which a run is nearest, that run and its signals."""
+    """The reading of a command with which a run is nearest, its notes say what was done; run and signals."""
     readings = driving.readings(driving.needed_command(design, record, command), record)
-    told: list[list[str]] = [list(notes) for _ in readings]
-    tried = [_run_so(one, record, measured, own, progress) for one, own in zip(readings, told, strict=True)]
-    best = min(range(len(tried)), key=lambda k: _unlikely(tried[k], measured))
-    notes[:] = told[best]
-    return tried[best]
+    tried = (_run_so(one, record, measured, progress) for one in readings)
+    return min(tried, key=lambda one: _unlikely(one, measured))
 
 
 def _unlikely(tried: _Modelled, measured: Mapping[str, Floats]) -> float:
@@ -199,14 +185,10 @@ def _unlikely(tried: _Modelled, measured: Mapping[str, Floats]) -> float:
 
 
 def _run_so(
-    driven: driving.Driven,
-    record: Record,
-    measured: Mapping[str, Floats],
-    notes: list[str],
-    progress: Progress = None,
+    driven: driving.Driven, record: Record, measured: Mapping[str, Floats], progress: Progress
 ) -> _Modelled:
     """The run of one reading and its signals, from the state in which the record begins."""
-    notes.extend(driven.notes)
+    notes = [*driven.notes]
     time, even = record.time_s - record.time_s[0], period_of(record) * np.arange(len(record))
     if (np.abs(time - even) <= 4.0 * np.spacing(np.abs(record.time_s).max())).all():
         time = even  # stamps of an epoch have few digits: a step of the command would miss its tick
@@ -230,9 +212,9 @@ def _run_so(
         if _off(part, goes) < _off(part, rest):
             initial = moving
             notes.append("the record begins in motion or under load, and so does the model")
-    made = _with_steps(driven, time, measured, partial(run, at=initial, progress=progress))
-    notes.append(f"model: {len(made[1].time_s)} ticks of {period * 1e6:g} us, command {made[0].between}")
-    return made
+    driven, made, series = _with_steps(driven, time, measured, partial(run, at=initial, progress=progress))
+    notes.append(f"model: {len(made.time_s)} ticks of {period * 1e6:g} us, command {driven.between}")
+    return replace(driven, notes=tuple(notes)), made, series
 
 
 def _off(measured: Mapping[str, Floats], modelled: Mapping[str, Floats]) -> float:

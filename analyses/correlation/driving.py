@@ -84,7 +84,9 @@ def readings(driven: Driven, record: Record) -> list[Driven]:
     held = replace(driven, together=len(record), between=HELD)
     row_s = float(record.time_s[-1] - record.time_s[0]) / max(len(record) - 1, 1)
     if (hold := hold_of(held.steps, len(record), row_s, tick_s)) is not None:
-        on_grid, anywhere = _on_grid(held, hold), hold.room_s > tick_s or hold.tick_s != tick_s
+        anywhere = hold.room_s > tick_s or hold.tick_s != tick_s
+        control = replace(driven.design.controller, period_s=hold.tick_s)  # by the record's clock
+        on_grid = replace(held, design=replace(driven.design, controller=control), hold=hold)
         if early is None:
             return [on_grid, held] if anywhere else [on_grid]
         told = early[held.steps]
@@ -97,12 +99,6 @@ def readings(driven: Driven, record: Record) -> list[Driven]:
         known = [one for one in other if np.array_equal(one.steps, np.flatnonzero(~np.isnan(early)))]
         other = [replace(one, early_s=early[one.steps]) for one in known]
     return [one for one in other if record.between in ("", one.between)] or [driven]
-
-
-def _on_grid(held: Driven, hold: Hold) -> Driven:
-    """A command that is held, with the tick that the rows tell by its steps."""
-    control = replace(held.design.controller, period_s=hold.tick_s)
-    return replace(held, design=replace(held.design, controller=control), hold=hold)
 
 
 def command_names(design: Design) -> dict[str, str]:
@@ -254,8 +250,8 @@ def load_of(design: Design, record: Record, time_s: Floats, notes: list[str]) ->
         notes.extend(f"load: the design's {key} acts" for key in own)
         return design, loads.constant(0.0)
     notes.extend(f"the recorded load holds all of it: the design's {key} is not added" for key in own)
-    bare = replace(design, load=design.load.bare())
-    return bare, loads.series(time_s, record[name], where=record.name)
+    series = loads.series(time_s, record[name], where=record.name)
+    return replace(design, load=design.load.bare()), series
 
 
 def first_states(driven: Driven, record: Record, measured: Mapping[str, Floats]) -> tuple[State, State]:

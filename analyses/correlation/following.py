@@ -121,5 +121,4 @@ def following_finding(design: Design, one: Followed) -> Finding:
     if not one.fails:
         largest = 100.0 * max(abs(one.clock), abs(one.off))
         return Finding(subject, True, f"within {largest:.2g} %" if largest else "they agree but for chance")
-    passed = None if loop is None or loop.integral_time_s is None else False
-    return Finding(subject, passed, one.words)
+    return Finding(subject, None if loop is None or loop.integral_time_s is None else False, one.words)

@@ -10,7 +10,7 @@ from scipy.signal import lfilter
 from actuator_lti.errors import InputError
 from actuator_lti.types import Floats
 from analyses.estimation.fit import Fit
-from analyses.estimation.means import autocovariance
+from analyses.estimation.series import autocovariance
 
 LEAST_OWN_SHARE = 0.03  # a column with less of its own beside those before it is not separated from them
 RESOLVED = 1e-5  # share of a slope that is its own: below it two values do the same
@@ -172,9 +172,9 @@ def covariance_of(records: Sequence[Information]) -> Floats:
 
 
 def scaled_lstsq(w: Floats, y: Floats) -> Floats:
-    """Least-squares values of ``y = w p``, each column divided by its size first."""
+    """Least-squares values of ``y = w p``, of one y or several columns, each of w over its size first."""
     scale = np.maximum(np.linalg.norm(w, axis=0), 1e-300)
-    return np.asarray(np.linalg.lstsq(w / scale, y, rcond=None)[0] / scale)
+    return np.asarray((np.linalg.lstsq(w / scale, y, rcond=None)[0].T / scale).T)
 
 
 def autoregressive(values: Floats) -> tuple[Floats, float]:

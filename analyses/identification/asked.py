@@ -24,12 +24,8 @@ Of = Literal["L", "T", "S", "closed"]
 class Settings:
     """What is looked for in records of a motion, and how."""
 
-    fix: Annotated[
-        list[str] | None, Option("Hold a value, such as friction.viscous=0; repeatable.", "KEY=VALUE")
-    ] = None
-    residual_limit: Annotated[
-        float, Option("Largest relative residual for which a design is written; 20.", "%")
-    ] = 20.0
+    fix: Annotated[list[str] | None, Option("Hold a key at a value; repeatable.", "KEY=VALUE")] = None
+    residual_limit: Annotated[float, Option("Largest relative residual of a written design; 20.", "%")] = 20.0
     inertia_to: Annotated[
         str,
         Option(
@@ -45,15 +41,9 @@ class Settings:
             "clearly better)."
         ),
     ] = "symmetric"
-    gravity: Annotated[bool, Option("Of records: look for a pendulum at the output, m g l sin(angle).")] = (
-        False
-    )
-    electrical: Annotated[
-        bool, Option("Of records: R, kE and kM from u = R i + kE w first (L if it shows).")
-    ] = False
-    refine: Annotated[
-        bool, Option("Of records: refine by simulation; the design gets the refined values.")
-    ] = False
+    gravity: Annotated[bool, Option("Of records: find a pendulum at the output, m g l sin(angle).")] = False
+    electrical: Annotated[bool, Option("Of records: R, kE, kM by u = R i + kE w first (L if shown).")] = False
+    refine: Annotated[bool, Option("Of records: refine by simulation what the design gets.")] = False
     cutoff_hz: Annotated[
         float | None, Option("Of records: low-pass cut-off (default 100, or 0.1 of the rate).", "Hz")
     ] = None
@@ -98,9 +88,7 @@ class Asked(Settings):
             argument=True,
         ),
     ]
-    validate: Annotated[list[Path] | None, Option("A record the fit does not see; repeatable.", "RECORD")] = (
-        None
-    )
+    validate: Annotated[list[Path] | None, Option("Record unseen by the fit; repeatable.", "RECORD")] = None
     response: Annotated[
         bool, Option("FILE is a measured frequency response of a loop: inertias, stiffness, damping, delay.")
     ] = False
@@ -109,9 +97,7 @@ class Asked(Settings):
     ] = None
     response_of: Annotated[
         Of,
-        Option(
-            "With --response: L (open loop), T = L/(1+L), S = 1/(1+L), closed (from the command).", flag="of"
-        ),
+        Option("With --response: L (open), T = L/(1+L), S = 1/(1+L), closed (from the command).", flag="of"),
     ] = "L"
     averages: Annotated[
         int | None,
@@ -123,9 +109,7 @@ class Asked(Settings):
     play: Annotated[
         Path | None, Option("With --frequency-response: a reversing motion, both angles.", "RECORD")
     ] = None
-    period_s: Annotated[
-        float | None, Option("Period of the excitation (default: found from the command).", "s")
-    ] = None
+    period_s: Annotated[float | None, Option("Period of the excitation; that of the command.", "s")] = None
     plan: Annotated[
         bool, Option("FILE is a design: motions that tell its values as closely as asked (then records).")
     ] = False

@@ -10,6 +10,7 @@ from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError, NumericalError
 from actuator_lti.types import Floats, Progress
 from analyses.estimation.least_squares import scaled_lstsq
+from analyses.estimation.parameters import default_value
 from analyses.identification.design_values import design_value, kept_constant
 from analyses.identification.richer import RicherLaws, compare_laws
 from analyses.identification.steady import SteadyPoint, steady_point
@@ -28,6 +29,7 @@ SPEED_REACHED = 0.01
 MOST_CAMPAIGN_TICKS = 200_000
 SPEED_TOLERANCE = 0.05
 LOAD_TOLERANCE = 0.10
+IN_MOTION = {"C0": "dry", "Cv": "viscous", "CM": "load_coefficient"}  # the same by the names of a motion's
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -99,9 +101,9 @@ def identify_campaign(
             aside.append(SetAside(id=run.id, reason=wrong, contradicts=True))
         else:
             points.append(point)
-    tools, outliers, own = campaign.instruments, campaign.outliers, _values_of(design)
+    tools, own = campaign.instruments, {name: default_value(design, one) for name, one in IN_MOTION.items()}
     try:
-        fit = fit_surface(points, tools, constant, outliers=outliers, fixed=fixed, kept=own)
+        fit = fit_surface(points, tools, constant, outliers=campaign.outliers, fixed=fixed, kept=own)
     except InputError as error:
         told = "; ".join(f"{run.id}: {run.reason}" for run in aside[:3])
         raise InputError(error.message + f" ({told})" * bool(told), campaign.origin) from None
@@ -163,13 +165,6 @@ def check_run(
             break
 
 
-def _values_of(design: Design) -> dict[str, float]:
-    """The design's own C0, Cv and CM, kept where the runs do not tell them."""
-    friction = design.friction
-    values = (friction.dry_torque_Nm, friction.viscous_Nms_rad, friction.load_coefficient)
-    return dict(zip(NAMES, values, strict=True))
-
-
 def campaign_items(
     design: Design, result: CampaignResult, simulated: float | None, limit: float, held: Collection[str] = ()
 ) -> tuple[Item, ...]:
@@ -178,9 +173,8 @@ def campaign_items(
     why = "".join(f"run {run.id}: {run.reason}" for run in aside[:1])
     why += f"; set aside are runs {', '.join(run.id for run in aside)}" if len(aside) > 1 else ""
     passed = None if aside else True
-    names, before = ("dry", "viscous", "load_coefficient"), _values_of(design)
-    found = fit.renamed(dict(zip(NAMES, names, strict=True)))
-    compared = [design_value(design, found, names[k], before[NAMES[k]]) for k in fit.told]
+    found, told = fit.renamed(IN_MOTION), [IN_MOTION[name] for name in NAMES if name not in fit.fixed]
+    compared = [design_value(design, found, one, default_value(design, one)) for one in told]
     items = []
     if design.load.path != "self-locking" and any(point.load_Nm for point in fit.points):
         reason = (

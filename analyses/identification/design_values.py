@@ -17,6 +17,7 @@ from actuator_lti.design.units import ampere_unit
 from actuator_lti.errors import InputError
 from actuator_lti.types import Floats
 from analyses.estimation.fit import Fit, Fixed
+from analyses.estimation.least_squares import scaled_lstsq
 from analyses.estimation.parameters import default_value, own_share, own_std, parameter
 from analyses.identification.electrical import (
     ElectricalFit,
@@ -282,7 +283,5 @@ def _shares(start: Design, name: str, model: JointModel, records: Sequence[Recor
         one, other = (rows_under(design, record, model) for design in (start, more))
         tables.append(weight * one.columns(model.names))
         targets.append(weight * np.column_stack([one.y - model.kept(one), (other.y - one.y) / STEP]))
-    table = np.concatenate(tables)
-    size = np.linalg.norm(table, axis=0)
-    value, change = np.linalg.lstsq(table / size, np.concatenate(targets), rcond=None)[0].T
+    value, change = scaled_lstsq(np.concatenate(tables), np.concatenate(targets)).T
     return np.divide(change, value, out=np.zeros_like(change), where=value != 0.0)

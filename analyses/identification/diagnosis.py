@@ -8,15 +8,15 @@ import numpy as np
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError, NumericalError
 from actuator_lti.types import Floats, Mask
-from analyses.correlation.closed_loop import AXIS_SIGNALS, model_signals
 from analyses.correlation.following import Followed, followed
 from analyses.estimation.least_squares import covariance_of, independent, information_of, solve, told_apart
-from analyses.estimation.means import correlation_time
 from analyses.estimation.parameters import Parameter, parameter
+from analyses.estimation.series import correlation_time
 from analyses.identification.friction_law import Bend, bend_of, kept_columns
 from analyses.identification.inverse import fit_records
 from analyses.identification.joint_model import JointModel, Recipe, RecordFit
 from analyses.identification.output_error import simulated_part
+from analyses.identification.own_bias import with_model_signals
 from analyses.identification.rows import drive_of, is_benchmark, recipe_for, record_rows, rows_under
 from analyses.records.consistency import ALIKE, SURE, Finding, clock_doubt, resistance_doubt
 from analyses.records.naming import KNOWN_UNITS
@@ -109,10 +109,7 @@ def _followed(start: Design, record: Record, simulated: Mapping[str, Floats]) ->
     one = followed(start, record, simulated)
     if one is None or one.alike >= ALIKE:
         return one
-    part = simulated_part(start, record)
-    names = [name for name in AXIS_SIGNALS[start.axis] if name in part.signals]
-    own, _ = model_signals(start, part, {name: part[name] for name in names})
-    return followed(start, record, own)
+    return followed(start, record, with_model_signals(start, simulated_part(start, record)).signals)
 
 
 def _with_doubts(

@@ -178,13 +178,8 @@ def _rows(design: Design, record: Record, recipe: Recipe | None, late_s: float) 
     return table[skip : len(table) - skip]
 
 
-def electrical_values(design: Design, fit: ElectricalFit) -> Fit:
-    """R, kE, L where it is shown, and kM with kE: one constant of one motor, correlated at 1."""
-    return fit.mapped(electrical_slopes(design, fit))
-
-
 def electrical_slopes(design: Design, fit: ElectricalFit) -> dict[str, dict[str, float]]:
-    """The keys of a design that a fit tells, by their slopes over its values."""
+    """Keys of R, kE, L where it is shown, and kM with kE (one constant), by their slopes over the values."""
     motor = design.motor
     if motor.constants != "dc" or motor.torque_constant_Nm_A is None:
         raise InputError('the voltage equation is identified for motors with "dc" constants', design.name)

@@ -109,7 +109,7 @@ def identify_frequency(
     if play is not None:
         dry = (design.load.friction or LoadFriction()).dry_torque_Nm
         told = f"the play is that at the design's load.friction.dry_torque, {dry:g} N m; more adds to it"
-        items.append(Item(id="kept-load_dry", label="Dry friction of the load", passed=None, reason=told))
+        items.append(Item.unproven("kept-load_dry", "Dry friction of the load", told))
     items.append(_written_item(read_design_text(write_design(made)), lines, record.name, fit.reaction))
     return FrequencyResult(
         record=record,
@@ -131,8 +131,7 @@ def _given(
     """What makes torques, and the load friction: what an error of each moves, found by another fit."""
     name, scale, made = constant_of(design, record), np.ones(len(lines.names)), dict[str, Fixed]()
     scale[0] += STEP
-    noise = lines.noise * np.outer(scale, scale)
-    larger = replace(lines, means=lines.means * scale[:, None], noise=noise)
+    larger = replace(lines, means=lines.means * scale[:, None], noise=lines.noise * np.outer(scale, scale))
     more = fit.reaction + STEP * (fit.reaction - 1.0 / fit.reduction)
     for one, tried, reaction in ((name, larger, fit.reaction), ("load_coefficient", lines, more)):
         if one is not None:

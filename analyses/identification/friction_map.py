@@ -7,7 +7,7 @@ import numpy as np
 from scipy.optimize import minimize_scalar
 
 from actuator_lti.types import Floats, Mask
-from analyses.estimation.means import correlation_time
+from analyses.estimation.series import correlation_time
 from analyses.identification.joint_model import JointModel, LawChoice, RecordFit, linear_basis
 
 MOST_BREAKS = 4

@@ -172,7 +172,7 @@ class _Search:
 
         def made(tried: Design) -> Floats:
             tried = _one_constant(design, tried)
-            runs = [model_signals(tried, *each)[0] for each in zip(parts, measured, strict=True)]
+            runs = [model_signals(tried, *each) for each in zip(parts, measured, strict=True)]
             return weighed(_drives(runs))
 
         for turn in range(rounds):
@@ -241,7 +241,7 @@ def _at_its_rows(
 
     def left(more: float) -> Floats:
         moved = replace(part, early_s=np.asarray(part.early_s) + more)
-        made = _drives([model_signals(design, moved, measured)[0]])
+        made = _drives([model_signals(design, moved, measured)])
         triples = zip(_drives([measured]), made, sizes, strict=True)
         return np.concatenate([(own - other) / size for own, other, size in triples])
 

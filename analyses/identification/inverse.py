@@ -51,8 +51,6 @@ def fit_records(
     Raises `InputError`: if a record lacks a signal, or nothing is left to fit. Raises `NumericalError`: if
     the rows are singular all the same.
     """
-    if not records:
-        raise InputError("no record to identify from")
     knots = None if knots_rad_s is None else tuple(float(v) for v in knots_rad_s)
     moments: Sequence[Floats | None] = [None] * len(records)
     for _ in range(GRAVITY_ROUNDS if gravity else 1):

@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
+from scipy.interpolate import make_interp_spline
 
 from actuator_lti.types import Floats, Mask
 from analyses.estimation.fit import Fit
@@ -46,9 +47,7 @@ class Recipe:
 
     def motion(self, values: Floats, period_s: float) -> Motion:
         """A position, filtered and differentiated."""
-        return filtered_motion(
-            values, period_s, cutoff_hz=self.cutoff_hz, order=self.filter_order, points=self.points
-        )
+        return filtered_motion(values, period_s, self.cutoff_hz, self.filter_order, self.points)
 
     def other_side(self, values: Floats, period_s: float) -> Floats:
         """A torque that is not made of the filtered position."""
@@ -86,12 +85,7 @@ def linear_basis(speed: Floats, knots: Sequence[float]) -> Floats:
     >>> linear_basis(np.array([0.0, 1.0, 4.0]), (0.0, 2.0, 3.0)).tolist()
     [[1.0, 0.0, 0.0], [0.5, 0.5, 0.0], [0.0, -1.0, 2.0]]
     """
-    v = np.asarray(knots, dtype=float)
-    k = np.clip(np.searchsorted(v, speed, side="right") - 1, 0, len(v) - 2)
-    share = (speed - v[k]) / (v[k + 1] - v[k])
-    out, rows = np.zeros((len(speed), len(v))), np.arange(len(speed))
-    out[rows, k], out[rows, k + 1] = 1.0 - share, share
-    return out
+    return np.asarray(make_interp_spline(knots, np.eye(len(knots)), k=1)(speed))
 
 
 @dataclass(frozen=True, kw_only=True)

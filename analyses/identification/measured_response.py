@@ -137,7 +137,7 @@ def _far_items(start: Design, fit: Fit, own: Mapping[str, float]) -> Iterator[It
         if own_std(start, key) > 0.0 and abs(fit[key] - value) > SURE * std:
             off = f"{abs(fit[key] - value) / std:.3g} standard deviations, its tolerance among them"
             reason = f"{_beside(fit[key], value, parameter(key, start.axis).unit)}: {off}"
-            yield Item(id=f"far-{key}", label=f"{key} is what the design allows", passed=None, reason=reason)
+            yield Item.unproven(f"far-{key}", f"{key} is what the design allows", reason)
 
 
 def _reach_items(made: Design, start: Design, measured: RecordedResponse) -> Iterator[Item]:
@@ -149,7 +149,7 @@ def _reach_items(made: Design, start: Design, measured: RecordedResponse) -> Ite
     if k != own and hertz > top:
         told = _beside(k, own, parameter("coupling.stiffness", start.axis).unit)
         reason = f"measured to {top:.4g} Hz, the antiresonance is at {hertz:.4g} Hz: stiffness {told}"
-        yield Item(id="reach", label="The measurement reaches the antiresonance", passed=None, reason=reason)
+        yield Item.unproven("reach", "The measurement reaches the antiresonance", reason)
 
 
 def _beside(value: float, own: float, unit: str) -> str:

@@ -9,7 +9,6 @@ from actuator_lti.design.model import Design
 from analyses.correlation.compare import white_noise
 from analyses.correlation.driving import command_of
 from analyses.identification.joint_model import JointModel, Recipe
-from analyses.identification.rows import recipe_for
 from analyses.records.consistency import place_of
 from analyses.records.differentiation import decimated
 from analyses.records.naming import RATES
@@ -40,18 +39,15 @@ def with_noise_of_motion(design: Design, model: JointModel, records: Sequence[Re
         return model
     turned = np.linalg.solve(free_of, gram)
     values, covariance = turned @ model.values, turned @ model.covariance @ turned.T
-    moved = values - model.values
-    bias = {
-        name: model.bias.get(name, 0.0) - float(one) for name, one in zip(model.names, moved, strict=True)
-    }
+    moved = zip(model.names, (values - model.values).tolist(), strict=True)
+    bias = {name: model.bias.get(name, 0.0) - one for name, one in moved}
     told = f"{model.bias_told}; what noise of the recorded motion takes is given back"
-    less = replace(model, values=values, covariance=covariance, bias=bias, bias_told=told)
-    return replace(less, noise_share=share)
+    return replace(model, values=values, covariance=covariance, bias=bias, bias_told=told, noise_share=share)
 
 
-def acceleration_noise(design: Design, record: Record, recipe: Recipe | None) -> float:
+def acceleration_noise(design: Design, record: Record, recipe: Recipe) -> float:
     """Mean square of the noise in the acceleration of a record's rows, (rad/s2)^2."""
-    recipe, period, place = recipe or recipe_for(record), period_of(record), place_of(design, record)
+    period, place = period_of(record), place_of(design, record)
     values = record[RATES[design.axis]] if place is None else place[1]
     count = max(PERIODS * round(1.0 / (recipe.cutoff_hz * period)), PERIODS * recipe.decimation) + 1
     made = recipe.motion(np.eye(1, count, count // 2)[0], period)

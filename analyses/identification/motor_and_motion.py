@@ -20,7 +20,7 @@ from analyses.identification.asked import Settings, fixed_values, held_by_name
 from analyses.identification.diagnosis import Diagnosed, diagnosed
 from analyses.identification.electrical import (
     ElectricalFit,
-    electrical_values,
+    electrical_slopes,
     fit_electrical,
     without_own_bias,
 )
@@ -176,8 +176,7 @@ class Sought:
         return _with_motor(self.plain, found, records), found
 
     def _diagnosed(self, start: Design, records: Sequence[Record], both: Fit | None = None) -> Diagnosed:
-        fit = partial(self._fitted, start, both=both)
-        return diagnosed(self.design, start, records, fit, self.recipe)
+        return diagnosed(self.design, start, records, partial(self._fitted, start, both=both), self.recipe)
 
     def _raw(
         self, start: Design, records: Sequence[Record], weights: Sequence[float] | None = None
@@ -264,7 +263,7 @@ def _settled(before: Fit, found: Fit) -> bool:
 
 def _with_motor(plain: Design, found: ElectricalFit, records: Sequence[Record]) -> Design:
     told = f"voltage equation of {names_of(records)}"
-    return to_design.design_with_fit(plain, electrical_values(plain, found), told)
+    return to_design.design_with_fit(plain, found.mapped(electrical_slopes(plain, found)), told)
 
 
 def names_of(records: Sequence[Record]) -> str:

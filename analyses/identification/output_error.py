@@ -105,8 +105,7 @@ def fit_output(
     def slopes(moved: Floats) -> Floats:
         to = STEP * np.diag(np.maximum(np.abs(moved), LEAST_STEPPED))
         both = [np.clip(moved + side * to, *box) for side in (1.0, -1.0)]
-        pairs = zip(*both, strict=True)
-        change = np.array([residual(up) - residual(down) for up, down in pairs])
+        change = np.array([residual(up) - residual(down) for up, down in zip(*both, strict=True)])
         return np.asarray((change / np.diag(both[0] - both[1])[:, None]).T)
 
     options = {"method": "dogbox", "xtol": TOLERANCE, "ftol": LEAST_GAIN, "max_nfev": ITERATIONS}
@@ -182,7 +181,7 @@ def refine_records(
     wanted = np.concatenate([measured[name] / size for _, name, measured, size in seen])
 
     def output(tried: Design) -> Floats:
-        parts = [model_signals(tried, one, measured)[0][name] / size for one, name, measured, size in seen]
+        parts = [model_signals(tried, one, measured)[name] / size for one, name, measured, size in seen]
         return np.concatenate(parts)
 
     found, (size, _) = fit_output(design, paths, output, wanted, progress), box_of(design, paths)

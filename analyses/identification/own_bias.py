@@ -20,13 +20,12 @@ from analyses.identification.joint_model import JointModel, RecordFit
 from analyses.identification.output_error import simulated_part
 from analyses.identification.rows import is_benchmark, motion_of, recipe_for
 from analyses.records.record import SMOOTH, Record
+from analyses.records.single_rows import ROUNDING, count_of
 
 LARGEST_BIAS = 0.2
 COMMAND_ROUNDS = 6
 ROUNDS = 3
 PLACES = {"angle", "output_angle", "position"}
-ROUNDING = 1e-6  # of a position in a file
-OFF_COUNT = 0.05  # of a count
 SETTLED = 0.1  # standard errors within which a bias that was found again is the one that was found before
 
 
@@ -128,18 +127,13 @@ def _with_noise(measured: RecordFit, simulated: RecordFit) -> RecordFit:
         return measured
     own, model = (part.at(both, part.own_residual) for part in (measured, simulated))
     table, seen = (measured.at(both, each) for each in (measured.w, measured.inputs))
-    told, free = (_projected(simulated.at(both, simulated.w), each) for each in (table, seen))
+    on = simulated.at(both, simulated.w)
+    told, free = (on @ scaled_lstsq(on, each) for each in (table, seen))
     compared = np.pad(both, (0, more))[measured.keep]
     w, inputs = measured.w.copy(), measured.inputs.copy()
     w[compared], inputs[compared] = told, free
     noise = own - table @ scaled_lstsq(told, own) - model
     return replace(measured, w=w, inputs=inputs, noise=noise, compared=compared)
-
-
-def _projected(on: Floats, values: Floats) -> Floats:
-    """What combinations of some columns make of others."""
-    on = on / np.maximum(np.linalg.norm(on, axis=0), 1e-300)
-    return np.asarray(on @ np.linalg.lstsq(on, values, rcond=None)[0])
 
 
 def _by_direction(model: JointModel, again: JointModel) -> Floats:
@@ -199,7 +193,7 @@ def _driven(design: Design, record: Record) -> Record:
 def with_model_signals(design: Design, record: Record) -> Record:
     """The record as the design would have made it: every signal that the model has is the model's."""
     names = [name for name in AXIS_SIGNALS[design.axis] if name in record.signals]
-    signals, _ = model_signals(design, record, {name: record[name] for name in names})
+    signals = model_signals(design, record, {name: record[name] for name in names})
     signals |= {n: in_counts(signals[n], record[n]) for n in PLACES & signals.keys()}
     return replace(record, signals={**record.signals, **signals})
 
@@ -210,14 +204,5 @@ def in_counts(values: Floats, recorded: Floats) -> Floats:
     >>> in_counts(np.array([0.1, 0.2, 0.3]), np.array([0.0, 0.25, 0.5, 1.0])).tolist()
     [0.0, 0.0, 0.25]
     """
-    levels = np.unique(recorded)
-    steps = np.diff(levels)
-    steps = steps[steps > ROUNDING * np.max(np.abs(levels))]  # of the file
-    if not len(steps):
-        return values
-    count = float(np.mean(steps[steps < 1.5 * np.min(steps)]))
-    many = np.round(steps / count)
-    if np.any(np.abs(steps / count - many) > OFF_COUNT):
-        return values
-    count = float(np.sum(steps) / np.sum(many))
-    return np.asarray(levels[0] + count * np.floor((values - levels[0]) / count + ROUNDING))
+    count, least = count_of(recorded), np.min(recorded)
+    return np.asarray(least + count * np.floor((values - least) / count + ROUNDING)) if count else values

@@ -10,7 +10,7 @@ from actuator_lti.design.model import Design
 from actuator_lti.design.plant import reachable_speed
 from actuator_lti.errors import InputError
 from actuator_lti.types import Floats, Progress
-from analyses.correlation.closed_loop import model_signals
+from analyses.correlation.closed_loop import nearest_run
 from analyses.estimation.fit import COVERAGE, Fit
 from analyses.estimation.least_squares import Information, covariance_of, information_of, told_apart
 from analyses.estimation.parameters import default_value
@@ -164,12 +164,12 @@ def _largest(design: Design, shape: str, cycles: int) -> tuple[Floats, Record]:
     for _ in range(24):
         asked = {wanted: amplitude * wave, **blank}
         bare = Record(name="plan", time_s=time, signals=asked, units={}, counts=RowCounts())
-        signals, limits = model_signals(design, bare, blank)
-        drive = signals[name]
+        _, run, series = nearest_run(design, bare, blank)
+        drive = series[name]
         cool = float(np.sqrt(np.mean(drive**2))) <= USED * own.continuous_current_A
         small = float(np.max(np.abs(drive))) <= USED * own.peak_current_A
-        if (name != "current" or (cool and small)) and not any(limits.values()):
-            return amplitude * wave, replace(bare, signals={**bare.signals, **signals})
+        if (name != "current" or (cool and small)) and not any(one.fraction for one in run.limits.values()):
+            return amplitude * wave, replace(bare, signals={**asked, **{one: series[one] for one in blank}})
         amplitude *= USED
     raise InputError(f"no motion of {cycles / SEGMENT_S:g} Hz stays off the drive's limits", design.name)
 

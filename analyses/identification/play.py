@@ -14,6 +14,7 @@ from analyses.estimation.parameters import own_std
 from analyses.identification.two_mass import TwoMass
 from analyses.records.differentiation import filtered_motion
 from analyses.records.record import Record
+from analyses.records.single_rows import count_of
 
 OF_THE_LOAD = ("stiffness", "load_inertia", "damping", "load_viscous")
 CONTACT = 0.25  # rows whose torque is above this share of its largest (95 % point) are taken as in contact
@@ -92,7 +93,7 @@ def _play_with(design: Design, record: Record, fit: TwoMass, values: Mapping[str
         if all(abs(new[name] - own[name]) <= 1e-9 * abs(new[name]) for name in own):
             break
         own = new
-    steps = _resolution(record["angle"]) / fit.reduction, behind * _resolution(record["output_angle"])
+    steps = count_of(record["angle"]) / fit.reduction, behind * count_of(record["output_angle"])
     coarse = _coarse(steps, touching, 0.5 / (cutoff * period))
     std = np.sqrt(result.correlated[kept.index(1), kept.index(1)])
     return Play(
@@ -110,16 +111,6 @@ def _coarse(steps: tuple[float, float], touching: Mask, smooth_samples: float) -
     visits = max(int(np.count_nonzero(np.diff(touching.astype(np.int8)) == 1)), 2)
     independent = np.count_nonzero(touching) / (0.5 * visits) / max(smooth_samples, 1.0)
     return float(np.hypot(*steps) / np.sqrt(12.0 * max(independent, 1.0)))
-
-
-def _resolution(values: Floats) -> float:
-    """The step of a recorded signal: the smallest difference between its values, if most are multiples."""
-    steps = np.diff(np.unique(values))
-    step = float(np.min(steps[steps > 1e-9 * float(np.ptp(values))], initial=np.inf))
-    if not np.isfinite(step):
-        return 0.0
-    shares = steps / step
-    return step if np.mean(np.abs(shares - np.round(shares)) < 0.01) > 0.95 else 0.0
 
 
 def _in_contact(torque_Nm: Floats, twist: Floats, half: float, guard_samples: int) -> Mask:

@@ -108,11 +108,8 @@ def stands(design: Design, record: Record, recipe: Recipe | None = None) -> bool
     place, rate = place_of(design, record), RATES[design.axis]
     if too_short(record) or (place is None and rate not in record.signals):
         return False  # it is refused for that
-    if place is None:
-        values = record[rate]
-    else:
-        moved = place[1] - place[1][0]  # exactly zero of a constant angle
-        values = moved - moved.mean()
+    values = record[rate] if place is None else place[1] - place[1][0]  # exactly zero of a constant angle
+    values = values if place is None else values - values.mean()
     recipe = recipe or recipe_for(record)
     return is_white(values, record, recipe) or _is_unmoved(design, record, recipe)
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from actuator_lti.types import Floats
-from analyses.estimation.means import correlated_means
+from analyses.estimation.series import correlated_means
 from analyses.records.campaign_import import ImportedRun
 from analyses.records.steady_window import SteadyWindow, find_steady_window
 
@@ -22,7 +22,7 @@ class SteadyPoint:
     covariance: Floats  # of the means of torque, speed and load, (3, 3), by their correlation in time
     window: SteadyWindow
     samples: int
-    correlation_samples: tuple[float, float, float]
+    correlation_samples: tuple[float, ...]
     load_is_zero: bool
 
 
@@ -36,7 +36,6 @@ def steady_point(run: ImportedRun, torque_constant_Nm_A: float) -> SteadyPoint:
     torque = direction * torque_constant_Nm_A * part["current"]
     means = correlated_means(np.column_stack([torque, direction * speed, side * load]))
     mean_torque, mean_speed, mean_load = means.values.tolist()
-    a, b, c = means.correlation_samples.tolist()
     return SteadyPoint(
         run=run.id,
         direction=direction,
@@ -46,6 +45,6 @@ def steady_point(run: ImportedRun, torque_constant_Nm_A: float) -> SteadyPoint:
         covariance=means.covariance,
         window=window,
         samples=len(speed),
-        correlation_samples=(a, b, c),
+        correlation_samples=tuple(means.correlation_samples.tolist()),
         load_is_zero=run.load_is_zero,
     )

@@ -10,7 +10,7 @@ from scipy.optimize import least_squares
 from actuator_lti.errors import InputError, NumericalError
 from actuator_lti.types import Complexes, Floats
 from analyses.estimation.fit import Fit, Fixed
-from analyses.estimation.means import autocovariance
+from analyses.estimation.series import autocovariance
 from analyses.records.record import Record
 
 MIN_PERIODS = 4

@@ -52,6 +52,11 @@ class Item:
         """What holds but for ``wrong``; empty: it holds."""
         return cls(id=id, label=label, passed=not wrong, reason=wrong, **share)
 
+    @classmethod
+    def unproven(cls, id: str, label: str, why: str) -> Item:
+        """What the records do not tell."""
+        return cls(id=id, label=label, passed=None, reason=why)
+
 
 @dataclass(frozen=True, kw_only=True)
 class Identified:
@@ -82,10 +87,10 @@ def inputs_item(record: str, findings: Sequence[Finding]) -> Item:
     """Whether a record agrees with itself and with the design's limits."""
     id, label = f"inputs-{record}", f"{record} agrees with itself and the design"
     if not findings:
-        return Item(id=id, label=label, passed=None, reason="nothing to hold it against")
+        return Item.unproven(id, label, "nothing to hold it against")
     wrong, doubt = wrong_of(findings), next((one for one in findings if one.unproven), None)
     if doubt is not None and not wrong:
-        return Item(id=id, label=label, passed=None, reason=f"{doubt.subject}: {doubt.text}")
+        return Item.unproven(id, label, f"{doubt.subject}: {doubt.text}")
     return Item.of(id, label, wrong)
 
 
@@ -124,31 +129,26 @@ def law_items(bend: Bend | None, model: JointModel, axis: str, commanded: bool =
 def independence_items(tests: Sequence[ResidualTest]) -> Iterator[Item]:
     """Inputs on which a residual hangs, beyond chance in all that were tried."""
     asked = [test for test in tests if test.input]
-    for test in asked:
-        if len(asked) * test.chance >= NO_CHANCE:
-            continue
+    for test in (one for one in asked if len(asked) * one.chance < NO_CHANCE):
         told = f"it hangs on it at a lag of {test.lag} rows: something is not modelled"
-        id = f"independent-{test.record}-{test.input}"
         label = f"{test.record}: residual independent of the {test.input}"
-        yield Item(id=id, label=label, passed=None, reason=f"{told}, the intervals need not hold it")
+        why = f"{told}, the intervals need not hold it"
+        yield Item.unproven(f"independent-{test.record}-{test.input}", label, why)
 
 
 def noise_items(model: JointModel) -> Iterator[Item]:
     """Noise of a recorded motion that took more from the inertia than its standard error."""
     if model.noise_share * model.get("inertia", 0.0) > model.std("inertia") > 0.0:
-        told = (
-            f"{100.0 * model.noise_share:.2g} % of its square is noise of the recorded motion, white as it "
-        )
-        told += "is from row to row, which took as much from the inertia: given back; a command tells better"
-        yield Item(id="noise", label="Acceleration without noise", passed=None, reason=told)
+        told = f"{100.0 * model.noise_share:.2g} % of its square is noise of the recorded motion, white as it"
+        told += " is from row to row, which took as much from the inertia: given back; a command tells better"
+        yield Item.unproven("noise", "Acceleration without noise", told)
 
 
 def kept_items(fit: Fit, held: Collection[str], axis: str = "rotary") -> Iterator[Item]:
     """What the records neither confirm nor deny: the design's values, but for those held as asked."""
     for name, kept in fit.fixed.items():
         if (kept.value or name == "gravity_cos") and name not in held:  # 0: the design's offset
-            label = parameter(name, axis).label
-            yield Item(id=f"kept-{name}", label=label, passed=None, reason=kept.reason)
+            yield Item.unproven(f"kept-{name}", parameter(name, axis).label, kept.reason)
 
 
 def made_items(unmade: str, before: Design, made: Design) -> Iterator[Item]:
@@ -157,7 +157,7 @@ def made_items(unmade: str, before: Design, made: Design) -> Iterator[Item]:
         yield Item.of("made", "A design comes of what is found", unmade)
     if before.friction.points and not made.friction.points:
         why = "viscous and dry friction take its place; --friction map finds a map"
-        yield Item(id="map", label="Friction map of the design", passed=None, reason=why)
+        yield Item.unproven("map", "Friction map of the design", why)
 
 
 def lag_items(late_s: float, period_s: float) -> Iterator[Item]:
@@ -165,7 +165,7 @@ def lag_items(late_s: float, period_s: float) -> Iterator[Item]:
     if late_s > period_s:
         told = f"{1e3 * late_s:.2g} ms off, or not told closer: what is sure is taken back as a delay"
         why = f"{told}, assumed no filter; inertia and friction hang on it"
-        yield Item(id="lag", label="Current and motion at one time", passed=None, reason=why)
+        yield Item.unproven("lag", "Current and motion at one time", why)
 
 
 def sampling_items(record: Record) -> Iterator[Item]:
@@ -175,8 +175,7 @@ def sampling_items(record: Record) -> Iterator[Item]:
         if lost := record.as_read.rows_missing:
             grid = f"a regular grid of {1e3 * record.period_s:.6g} ms"
             told = f"{lost} rows are missing on {grid}, filled by straight lines"
-        label = f"{record.name}: times of the rows"
-        yield Item(id=f"times-{record.name}", label=label, passed=None, reason=told)
+        yield Item.unproven(f"times-{record.name}", f"{record.name}: times of the rows", told)
     x = record.signals.get("current", np.zeros(0))
     if len(x) < 3 or not np.any(x):
         return
@@ -239,7 +238,7 @@ def offset_items(design: Design, fit: Fit) -> Iterator[Item]:
     beside = f"beside the design's {own:.3g} {unit}" if stated else "that the design does not state"
     told = f"{more:+.3g} {unit} {beside}: a load not recorded, or an offset of the current"
     label = "Constant torque is the design's" if design.axis == "rotary" else "Constant force is the design's"
-    yield Item(id="offset", label=label, passed=None, reason=told)
+    yield Item.unproven("offset", label, told)
 
 
 def following_item(record: str, followed: Followed) -> Item:

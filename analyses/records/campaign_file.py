@@ -117,8 +117,7 @@ def load_campaign(path: str | Path) -> Campaign:
     Raises `InputError`: names the file, the key, its value and what is allowed.
     """
     path = as_path(path)
-    root = Table(read_campaign_toml(path), "", str(path))
-    refuse_design(root)
+    root = records_table(path)
     root.only(("campaign", "drive", "sensor", "join", "instruments", "run"))
     head = root.table("campaign")
     with in_file(str(path)):
@@ -136,10 +135,12 @@ def load_campaign(path: str | Path) -> Campaign:
     return campaign
 
 
-def refuse_design(root: Table) -> None:
-    """Refuse a design where records are wanted."""
+def records_table(path: Path) -> Table:
+    """The file of a campaign or of records; a design is refused."""
+    root = Table(read_campaign_toml(path), "", str(path))
     if {"motor", "design"} & set(root):
         raise InputError(f"a design, and no record; allowed: {RECORDS}", where=root.origin)
+    return root
 
 
 def _check(campaign: Campaign) -> None:

@@ -42,7 +42,7 @@ class ImportedRun:
         return "" if self.load_is_zero or self.sensor is None else self.sensor.sha256
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class SetAside:
     """A run that could not be used, and why; ``contradicts``: its records do not agree, with what is said."""
 
@@ -111,8 +111,7 @@ def import_campaign(campaign: Campaign, *, progress: Progress = None) -> Importe
                 sensor = read_record(entry.sensor, campaign.sensor)
             runs.append(assemble_run(campaign, entry, drive, sensor))
         except InputError as error:
-            wrong = isinstance(error, Mismatch)
-            aside.append(SetAside(id=entry.id, reason=str(error), contradicts=wrong))
+            aside.append(SetAside(entry.id, str(error), contradicts=isinstance(error, Mismatch)))
         if progress is not None:
             progress(k, len(campaign.runs))
     if not runs:

@@ -1,15 +1,13 @@
 """Two recorders with clocks of their own, put on one: by a shared event, or by correlation."""
 
 from dataclasses import dataclass, replace
-from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
 
 from actuator_lti.errors import InputError
 from actuator_lti.types import Floats
-from analyses.estimation.means import best_lag, correlation_time
-from analyses.estimation.smoothing import without_noise
+from analyses.estimation.series import best_lag, correlation_time, without_noise
 from analyses.records.campaign_file import Join
 from analyses.records.factors import named_factor
 from analyses.records.record import Record
@@ -97,8 +95,8 @@ def joined_by(first: Record, second: Record, join: ClockJoin) -> Record:
     added = {name: np.interp(cut.time_s, time, values) for name, values in second.signals.items()}
     return replace(
         cut,
-        signals=MappingProxyType({**cut.signals, **added}),
-        units=MappingProxyType({**first.units, **second.units}),
+        signals={**cut.signals, **added},
+        units={**first.units, **second.units},
         notes=(*first.notes, *second.notes, str(join)),
     )
 

@@ -199,14 +199,10 @@ def _line_blocks(stream: BinaryIO, origin: str, digest: hashlib._Hash) -> Iterat
     data = data.removeprefix(b"\xef\xbb\xbf")
     while data:
         if b"\0" in data:
-            raise InputError(
-                "holds NUL bytes: not a text file (UTF-16 is not read; save it as UTF-8)", origin
-            )
+            raise InputError("holds NUL bytes: no text file (UTF-16 is not read; save it as UTF-8)", origin)
         cut = data.rfind(b"\n") + 1
         if not cut and len(rest) + len(data) > CSV_LINE_BYTES.most + BLOCK_BYTES:
-            raise InputError(
-                f"a line longer than {CSV_LINE_BYTES.most} bytes: not a table of numbers", origin
-            )
+            raise InputError(f"a line longer than {CSV_LINE_BYTES.most} bytes: no table of numbers", origin)
         if cut:
             yield rest + data[:cut]
         rest = data[cut:] if cut else rest + data

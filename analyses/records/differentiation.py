@@ -13,7 +13,7 @@ from actuator_lti.types import Floats
 
 LARGEST_DIRECT = 10
 # a search filters the same rows a thousand times, and designing the filter takes as long as running it
-_butterworth, _chebyshev = (lru_cache(maxsize=64)(design) for design in (butter, cheby1))
+butterworth, _chebyshev = (lru_cache(maxsize=64)(design) for design in (butter, cheby1))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -50,11 +50,9 @@ def central_difference(values: Floats, period_s: float, points: int = 3) -> Floa
     return simple
 
 
-def filtered_motion(
-    position: Floats, period_s: float, *, cutoff_hz: float, order: int, points: int = 3
-) -> Motion:
+def filtered_motion(place: Floats, period_s: float, cutoff_hz: float, order: int, points: int = 3) -> Motion:
     """A position behind `low_pass`, then central differences over three or seven points twice."""
-    smooth = low_pass(position, period_s, cutoff_hz=cutoff_hz, order=order)
+    smooth = low_pass(place, period_s, cutoff_hz=cutoff_hz, order=order)
     velocity = central_difference(smooth, period_s, points)
     acceleration = central_difference(velocity, period_s, points)
     return Motion(position=smooth, velocity=velocity, acceleration=acceleration)
@@ -71,20 +69,16 @@ def low_pass(values: Floats, period_s: float, *, cutoff_hz: float, order: int) -
     if not 0.0 < cutoff_hz < 0.5 / period_s:
         raise InputError(f"cutoff = {cutoff_hz:g} Hz: must be between 0 and {0.5 / period_s:g} Hz")
     if (2.0 * cutoff_hz * period_s) ** order < np.finfo(float).eps:
-        raise InputError(
-            f"cutoff = {cutoff_hz:g} Hz: too low for rows that are {period_s:g} s apart; allowed: fewer rows "
-            "or a higher cut-off"
-        )
+        told = f"cutoff = {cutoff_hz:g} Hz: too low for rows that are {period_s:g} s apart"
+        raise InputError(f"{told}; allowed: fewer rows or a higher cut-off")
     if len(values) <= 3 * order:
         raise InputError(f"{len(values)} samples: more than {3 * order} are needed; allowed: a longer record")
     lowest_hz = 0.3 * order / ((len(values) - 1) * period_s)
     padding = round(3 * order * max(1.0, 0.1 / (cutoff_hz * period_s)))
     if len(values) <= padding:
-        told = f"its filter remembers {padding} rows, and there are {len(values)}"
-        raise InputError(
-            f"cutoff = {cutoff_hz:g} Hz: {told}; allowed: {lowest_hz:.6g} Hz and more, or more rows"
-        )
-    b, a = _butterworth(order, 2.0 * cutoff_hz * period_s)
+        told = f"its filter remembers {padding} rows, and there are {len(values)}; allowed:"
+        raise InputError(f"cutoff = {cutoff_hz:g} Hz: {told} {lowest_hz:.6g} Hz and more, or more rows")
+    b, a = butterworth(order, 2.0 * cutoff_hz * period_s)
     return np.asarray(filtfilt(b, a, values, padlen=padding), dtype=np.float64)
 
 

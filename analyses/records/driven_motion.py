@@ -66,10 +66,8 @@ def wrong_time_of_speed(design: Design, record: Record) -> str:
     factor = next((one for one in units if 0.5 < inertia / one < 2.0 and 0.5 < one * inverse < 2.0), None)
     if alike < ALIKE or not 0.5 < friction < 2.0 or factor is None:
         return ""
-    told = (
-        f"by the current the inertia is {inertia:.4g} times the design's, the friction {friction:.4g} times"
-    )
-    return f"{told}: factor {named_factor(factor)}, in the unit of the time"
+    told = f"by the current the inertia is {inertia:.4g} times the design's, the friction {friction:.4g}"
+    return f"{told} times: factor {named_factor(factor)}, in the unit of the time"
 
 
 def _is_loaded(design: Design, record: Record) -> bool:

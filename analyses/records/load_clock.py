@@ -10,8 +10,7 @@ from scipy.stats import chi2
 
 from actuator_lti.errors import InputError
 from actuator_lti.types import Floats
-from analyses.estimation.means import correlation_time
-from analyses.estimation.smoothing import minus_likelihood, slow_shares, without_noise
+from analyses.estimation.series import correlation_time, minus_likelihood, slow_shares, without_noise
 from analyses.records.clocks import ClockJoin
 from analyses.records.consistency import NO_CHANCE, SURE
 from analyses.records.record import Record

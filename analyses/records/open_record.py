@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import Any
 
 from actuator_lti.errors import InputError
-from actuator_lti.files.reading import as_path, open_regular, read_campaign_toml, shown, shown_path
-from analyses.records.campaign_file import RECORDS, record_spec, refuse_design
+from actuator_lti.files.reading import as_path, open_regular, shown, shown_path
+from analyses.records.campaign_file import RECORDS, record_spec, records_table
 from analyses.records.csv_stream import STAMP, text_of
 from analyses.records.inputs import spec_of_names
 from analyses.records.naming import is_unit
@@ -88,13 +88,11 @@ def open_records(path: str | Path) -> list[Record]:
         record = replace(record, signals=signals, units={**record.units, "force": "N"})
     notes = ("" if one.signal else why.get(one.column, "") for one in record.inputs)
     pairs = zip(record.inputs, notes, strict=True)
-    inputs = tuple(replace(one, note=note or one.note) for one, note in pairs)
-    return [replace(record, inputs=inputs)]
+    return [replace(record, inputs=tuple(replace(one, note=note or one.note) for one, note in pairs))]
 
 
 def _described(path: Path) -> list[Record]:
-    root = Table(read_campaign_toml(path), "", str(path))
-    refuse_design(root)
+    root = records_table(path)
     if not {"file", "record"} & set(root):
         raise InputError(f"a TOML file, and no record; allowed: {RECORDS}", where=str(path))
     shared = {key: value for key, value in root.data.items() if key != "record"}

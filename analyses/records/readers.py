@@ -5,7 +5,6 @@ from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from io import BytesIO
 from pathlib import Path
-from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -119,7 +118,7 @@ def read_record(path: Path, spec: RecordSpec) -> Record:
         content, digest = load_mat(path)
         constants = {k: float(v.ravel()[0]) for k, v in content.arrays.items() if v.size == 1}
         record = record_of_columns(columns_of(content, spec.format, path), spec, path, digest)
-        return replace(record, constants=MappingProxyType(constants))
+        return replace(record, constants=constants)
     if suffix in TABLES:
         vectors, digest = TABLES[suffix](path)
         return record_of_columns(vectors, spec, path, digest)

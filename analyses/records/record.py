@@ -7,7 +7,6 @@ from dataclasses import dataclass, field, replace
 from datetime import datetime
 from functools import lru_cache
 from itertools import chain, count
-from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -70,7 +69,7 @@ class Record:
     counts: RowCounts
     averaged: int = 1  # rows of a file too long to be held that were averaged into one
     sha256: str = ""
-    constants: Mapping[str, float] = field(default_factory=lambda: MappingProxyType({}))
+    constants: Mapping[str, float] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
     inputs: tuple[InputColumn, ...] = ()  # every column of the file
     resample_tolerance: float = RESAMPLE_TOLERANCE
@@ -78,7 +77,7 @@ class Record:
     first_row: int = field(default=0, repr=False)  # rows of the file that come before the first
     as_read: Record | None = field(default=None, repr=False)  # before it was put on a grid; None: it is that
     # Keys of a design, with values that were other than the design's while this record was taken
-    settings: Mapping[str, str | float] = field(default_factory=lambda: MappingProxyType({}))
+    settings: Mapping[str, str | float] = field(default_factory=dict)
     # How the drive took its command between the rows: SMOOTH, STRAIGHT, HELD; empty: as it meets them best
     between: str = ""
     early_s: Floats | None = field(default=None, repr=False)  # a step of it came before each row; NaN: none
@@ -122,16 +121,10 @@ class Record:
 
     def slice(self, start: int, stop: int) -> Record:
         """Rows ``start:stop``."""
-        cut = {name: values[start:stop] for name, values in self.signals.items()}
-        parts = {"left_out": self.left_out, "early_s": self.early_s}
-        cut_rows: Any = {name: None if rows is None else rows[start:stop] for name, rows in parts.items()}
-        return replace(
-            self,
-            time_s=self.time_s[start:stop],
-            signals=MappingProxyType(cut),
-            **cut_rows,
-            first_row=self.first_row + start,
-        )
+        own: Any = {name: getattr(self, name) for name in ("time_s", "left_out", "early_s")}
+        own = {name: rows if rows is None else rows[start:stop] for name, rows in own.items()}
+        signals = {name: values[start:stop] for name, values in self.signals.items()}
+        return replace(self, signals=signals, first_row=self.first_row + start, **own)
 
     def without(self, names: Collection[str]) -> Record:
         """The record without some signals."""
@@ -157,8 +150,7 @@ class Record:
         note += f"{steps[widest]:.4g} s at {self.time_s[widest]:.4g} s, error up to "
         note += f"{100.0 * error:.2g} % of the range ({worst})"
         check_error(error, self.resample_tolerance, note, self.name)
-        notes = (*self.notes, note)
-        return replace(self, time_s=grid, signals=MappingProxyType(cut), notes=notes, as_read=self)
+        return replace(self, time_s=grid, signals=cut, notes=(*self.notes, note), as_read=self)
 
 
 @lru_cache(maxsize=64)

@@ -1,4 +1,4 @@
-"""Rows that no drive can have taken, each by its line, time and value."""
+"""Rows that no drive can have taken, each by its line, time and value; noise and counts of a signal."""
 
 import numpy as np
 from scipy.special import ndtr, ndtri
@@ -8,6 +8,8 @@ from analyses.records.record import Record
 
 MOST_NAMED = 3
 NORMAL = 1.4826  # standard deviation of a normal spread over its median
+ROUNDING = 1e-6  # of a position in a file
+OFF_COUNT = 0.05  # of a count
 
 
 def noise_bound(values: Floats, sure: float) -> float:
@@ -21,6 +23,23 @@ def noise_bound(values: Floats, sure: float) -> float:
     """
     std = NORMAL * float(np.median(np.abs(np.diff(values, 2)))) / np.sqrt(6.0) if len(values) > 2 else 0.0
     return std * -float(ndtri(ndtr(-sure) / len(values)))
+
+
+def count_of(values: Floats) -> float:
+    """The count of the encoder that a position was read from, where all of it is at such; else 0.
+
+    >>> count_of(np.array([0.0, 0.25, 0.5, 1.0])), count_of(np.array([0.0, 0.25, 0.6]))
+    (0.25, 0.0)
+    """
+    levels = np.unique(values)
+    steps = np.diff(levels)
+    steps = steps[steps > ROUNDING * np.max(np.abs(levels))]  # of the file
+    if not len(steps):
+        return 0.0
+    count = float(np.mean(steps[steps < 1.5 * np.min(steps)]))
+    many = np.round(steps / count)
+    whole = np.all(np.abs(steps / count - many) <= OFF_COUNT)
+    return float(np.sum(steps) / np.sum(many)) if whole else 0.0
 
 
 def impossible_steps(record: Record, place: Floats, rate: float, sure: float) -> Ints:

@@ -3,7 +3,6 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from types import MappingProxyType
 
 import numpy as np
 
@@ -121,10 +120,8 @@ class SiRows:
             told = f"time {time[k]:.15g} s does not come after {reached[k]:.15g} s"
             if time[k] == reached[k]:
                 told += ": a row twice, or stamps of too few digits (then give time.period, not a column)"
-            told += (
-                '; allowed: rising times: a file for each run; or disorder = "drop" in a record file, which '
-            )
-            told += "leaves out this row and all that follow up to the time that was reached"
+            told += '; allowed: rising times: a file for each run; or disorder = "drop" in a record file, '
+            told += "which leaves out this row and all that follow up to the time that was reached"
             raise InputError(told, where=f"{self._origin}:{block.lines[k]}")
         return keep
 
@@ -147,8 +144,7 @@ def record_of_columns(vectors: Mapping[str, Floats], spec: RecordSpec, path: Pat
     table = np.column_stack(columns)
     counts = RowCounts(rows_in=len(table), columns=header)
     block = Block(values=table, lines=np.arange(1, len(table) + 1))
-    rows = SiRows(spec, counts, f"{path}, row")(block)
-    return record_of_rows(rows, spec, path, counts, digest)
+    return record_of_rows(SiRows(spec, counts, f"{path}, row")(block), spec, path, counts, digest)
 
 
 def record_of_rows(
@@ -170,8 +166,8 @@ def record_of_rows(
     return Record(
         name=shown_path(path.name),
         time_s=time,
-        signals=MappingProxyType(signals),
-        units=MappingProxyType({signal.name: to_si(signal)[1] for signal in spec.signals}),
+        signals=signals,
+        units={signal.name: to_si(signal)[1] for signal in spec.signals},
         counts=counts,
         averaged=averaged,
         sha256=digest,

@@ -90,11 +90,7 @@ def _limited(design: Design, verdict: RequirementVerdict) -> str:
     return said_of(design, value)
 
 
-Moving = Callable[[], LoopFigures | None]
-"""The position loop of a drive in a motion that averages its cogging and gear error."""
-
-
-def _in_motion(verdict: RequirementVerdict, moving: Moving) -> str:
+def _in_motion(verdict: RequirementVerdict, moving: Callable[[], LoopFigures | None]) -> str:
     """Beside a response of a drive that stands in its cogging what it is in a motion over many periods."""
     of, value = verdict.requirement, verdict.value
     if verdict.loop != "position" or not QUANTITIES[of.quantity].of_response or (found := moving()) is None:
@@ -104,10 +100,6 @@ def _in_motion(verdict: RequirementVerdict, moving: Moving) -> str:
     if there is None or there == here:
         return ""
     return f"within a period of its cogging or gear error; in a motion over many {there}"
-
-
-Asked = Callable[[str], tuple[float | None, str]]
-"""From the name of a quantity to what an analysis found, or why there is nothing."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -156,9 +148,12 @@ def tally(verdicts: Iterable[RequirementVerdict]) -> Tally:
 
 
 def judged(
-    design: Design, requirement: Requirement, figures: Mapping[str, LoopFigures], asked: Asked
+    design: Design,
+    requirement: Requirement,
+    figures: Mapping[str, LoopFigures],
+    asked: Callable[[str], tuple[float | None, str]],
 ) -> list[RequirementVerdict]:
-    """Judge one requirement wherever it holds; ``asked`` finds what only an analysis finds."""
+    """Judge one requirement wherever it holds; ``asked``: by a name what an analysis finds, or why not."""
     quantity = QUANTITIES.get(requirement.quantity)
     if quantity is None:
         told = f"quantity = {requirement.quantity!r}: allowed are {', '.join(QUANTITIES)}"

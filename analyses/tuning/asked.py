@@ -47,9 +47,7 @@ class Asked:
 
     require: Annotated[
         list[str] | None,
-        Option(
-            'In place of that of the design: "position.bandwidth>=30 Hz"; repeatable.', "LOOP.QUANTITY>=LIMIT"
-        ),
+        Option('In place of the design\'s: "position.bandwidth>=30 Hz"; repeatable.', "LOOP.QUANTITY>=LIMIT"),
     ] = None
     aim: Annotated[
         Aim,

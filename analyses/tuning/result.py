@@ -152,8 +152,7 @@ def nonlinear_checks(
     worst, plan = int(np.argmin(result.min(axis=1))), LargeSignal.plan(tuned)
     names = ["nominal", "worst corner"][: 2 if worst else 1]
     points = problem.all_corners[[0, worst][: len(names)]]
-    values = problem.values_at(gains[None, :], points, problem.factors)
-    population = Population(tuned, values, len(names))
+    population = Population(tuned, problem.values_at(gains[None, :], points, problem.factors), len(names))
     for size in (0.05 * plan.deflection_rad, plan.deflection_rad):
         columns = step_columns(StepCheck(size, plan.duration_s), population)
         for k, corner in enumerate(names):

@@ -77,8 +77,7 @@ def start_points(problem: Problem, working: Floats) -> Floats:
     spread = rng.uniform(-2.5, 2.5, (400, centres.shape[1]))
     rows = np.vstack([centres, centres[np.arange(400) % 2] + spread])
     cloud = np.clip(problem.values(rows), problem.lower, problem.upper)
-    slack = problem.distances(cloud, working).min(axis=(1, 2))
-    order = np.argsort(-slack, kind="stable")
+    order = np.argsort(-problem.distances(cloud, working).min(axis=(1, 2)), kind="stable")
     return np.vstack([cloud[:1], cloud[order[:2]]])
 
 

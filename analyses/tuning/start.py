@@ -191,8 +191,8 @@ def _filter(design: Design, element: Element) -> tuple[Filter, list[Variable]]:
     high = END_OF_BAND * pi / design.controller.period_of("velocity")
     low = high / 1000.0
     if element == "lowpass":
-        lowpass = Filter(kind="lowpass", frequency_rad_s=high)
-        return lowpass, [Variable("frequency", high, low, high, high)]
+        item = Filter(kind="lowpass", frequency_rad_s=high)
+        return item, [Variable("frequency", high, low, high, high)]
     free = sqrt(low * high) if design.coupling is None else resonance_rad_s(design)
     centre = float(np.clip(free, low, high))
     item = Filter(kind="notch", frequency_rad_s=centre, width_rad_s=0.5 * centre, depth=1.0)

@@ -229,6 +229,6 @@ def test_a_held_command_steps_at_its_rows_from_any_epoch() -> None:
     for start in (0.0, 1.7e9, -1.7e9):
         time = start + rows * 10 * period
         record = replace(record_of(time, reference=held, angle=np.zeros(rows.size)), between=HELD)
-        made.append(model_signals(BASE, record, {"angle": record["angle"]})[0]["angle"])
+        made.append(model_signals(BASE, record, {"angle": record["angle"]})["angle"])
     assert made[0].max() > 1.0
     assert all(np.array_equal(made[0], one) for one in made[1:])

@@ -13,7 +13,7 @@ from analyses.correlation.closed_loop import correlate_record
 from analyses.estimation.fit import Fit
 from analyses.identification.asked import Settings
 from analyses.identification.bench import identify_bench
-from analyses.identification.electrical import electrical_values, fit_electrical
+from analyses.identification.electrical import electrical_slopes, fit_electrical
 from analyses.identification.friction_map import fit_map
 from analyses.identification.inverse import fit_records
 from analyses.identification.rows import recipe_for
@@ -242,7 +242,7 @@ def test_no_inductance_is_invented_and_a_cutoff_keeps_out_what_is_above_it() -> 
 def test_the_motors_one_constant_goes_into_the_design_as_one() -> None:
     design = _joint()
     fit = fit_electrical(design, [_voltage_record(0.5, fast=False)])
-    made = design_with_fit(design, electrical_values(design, fit), "record")
+    made = design_with_fit(design, fit.mapped(electrical_slopes(design, fit)), "record")
     back = read_design_text(write_design(made))
     assert back.motor.torque_constant_Nm_A == back.motor.back_emf_constant_Vs_rad
     assert back.motor.inductance_H == design.motor.inductance_H

@@ -7,7 +7,7 @@ import pytest
 from scipy.signal import lfilter
 
 from actuator_lti.design import load_design
-from analyses.estimation.means import correlated_means, correlation_time
+from analyses.estimation.series import correlated_means, correlation_time
 from analyses.identification.inverse import fit_records
 from analyses.identification.residuals import LEVEL, ResidualTest, residual_tests
 from analyses.identification.sampled_current import HeldVoltage
