@@ -20,6 +20,7 @@ from tests.changed import changed
 from tests.loops.own_laws import random_law
 from tests.validation.mutation_table import DRIVES, PAGE, keys_of, seen
 from tests.validation.random_drives import drives, full_drive
+from tests.validation.rich_drives import rich_drive
 
 AMBER = load_design("ilr33-amber")
 
@@ -44,7 +45,8 @@ def test_every_row_is_met_on_a_shipped_drive(name: str) -> None:
 def test_no_false_alarm_on_random_drives() -> None:
     """And on some where a twist of 5e4 rad, faint friction, sin(pi) were rounded."""
     rounded = map(full_drive, (80365, 1094, 240, 723))
-    for design in (*rounded, *drives(9000, 150)):
+    rich = (rich_drive(seed, own_law=False) for seed in range(60))
+    for design in (*rounded, *rich, *drives(9000, 150)):
         assert red(design, design) == set(), design.name
 
 
