@@ -226,7 +226,8 @@ def test_a_linear_motor_is_asked_for_the_period_of_its_cogging(key: str) -> None
 def test_the_constants_that_a_sheet_has_are_told_by_their_ratio(stated, ampere, volt, constants, units):
     """A sinusoidal motor of flux constant k: torque 3/2 k a peak ampere, k volts peak of a phase per rad/s.
 
-    ``ampere`` peak amperes are one of the sheet, ``volt`` of its volts are a peak volt of a phase.
+    ``ampere`` peak amperes are one of the sheet, ``volt`` of its volts are a peak volt of a phase. Losses are
+    3/2 R i^2, of the model's sqrt(3)/2 i: 2 R of a phase, which is R line-line.
     """
     kM, kE = 0.03 * ampere, 0.02 * volt
     if stated != constants or any(units):
@@ -238,6 +239,7 @@ def test_the_constants_that_a_sheet_has_are_told_by_their_ratio(stated, ampere, 
     drive = read_design_text(motor(constants, torque_constant=kM_text, back_emf_constant=kE_text))
     assert drive.effective_motor.back_emf_constant_Vs_rad == pytest.approx(3**0.5 * 0.02, rel=1e-12)
     assert drive.effective_motor.torque_constant_Nm_A == pytest.approx(3**0.5 * 0.02, rel=1e-12)
+    assert drive.effective_motor.resistance_ohm == pytest.approx(5.9 * (1 + (constants == "peak-phase")))
 
 
 def test_what_a_sheet_states_besides_follows_from_the_keys(cli, tmp_path) -> None:

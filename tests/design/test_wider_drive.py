@@ -20,13 +20,6 @@ from tests.refusals import refused
 from tests.validation.random_drives import full_drive
 
 AMBER = load_design("ilr33-amber")
-DIRECT = {  # the amperes of ilr33-amber, as an AC motor's file has to say them
-    "limits.peak_current": "12 A dc",
-    "limits.continuous_current": "4 A dc",
-    "control.current.gain": "0.02 V/A dc",
-    "control.velocity.gain": "0.12 A dc*s/rad",
-    "requirement.motor-current.maximum": "4 A dc",
-}
 FILTER = "control.velocity.filter"
 STIFF = {"stiffness": "100 N*m/rad"}
 NOTCH = {"kind": "notch", "frequency": "640 rad/s", "width": "320 rad/s", "depth": 0.1}
@@ -44,36 +37,6 @@ def test_the_two_meanings_of_a_peak_time_of_one_design_and_of_many() -> None:
     assert many == pytest.approx(times / np.log(squares / (squares - 1)))
     many = stacked(base, {"limits.peak_time": times}).limits.overload_time_s
     assert many == pytest.approx(times * 8.490187, rel=1e-6)
-
-
-@pytest.mark.parametrize("constants", ["rms-line", "peak-phase"])
-def test_an_ac_motor_keeps_torque_losses_and_voltage_limit(constants: str) -> None:
-    """A sinusoidal motor of phase flux constant k: amplitudes of a phase give 3/2 k i and 3/2 R i^2."""
-    k, R, L, amplitude, speed = 0.3, 0.7, 2e-3, 5.0, 40.0
-    torque, loss = 1.5 * k * amplitude, 1.5 * R * amplitude**2
-    if constants == "rms-line":
-        sheet = {"kM": torque / (amplitude / sqrt(2)), "kE": sqrt(3) * k / sqrt(2), "R": 2 * R, "L": 2 * L}
-        current = sqrt(1.5) * amplitude / sqrt(2)
-    else:
-        sheet = {"kM": 1.5 * k, "kE": k, "R": R, "L": L}
-        current = sqrt(3) / 2 * amplitude
-    motor = with_overrides(
-        AMBER,
-        DIRECT
-        | {
-            "motor.constants": constants,
-            "motor.torque_constant": f"{sheet['kM']!r} N*m/A",
-            "motor.back_emf_constant": f"{sheet['kE']!r} V*s/rad",
-            "motor.resistance": f"{sheet['R']!r} ohm",
-            "motor.inductance": f"{sheet['L']!r} H",
-            "limits.speed": "1 rad/s",
-        },
-    ).effective_motor
-    assert motor.torque_constant_Nm_A * current == pytest.approx(torque, rel=1e-14)
-    assert motor.resistance_ohm * current**2 == pytest.approx(loss, rel=1e-14)
-    # the peak of the line-line voltage is what the bus limits
-    assert motor.back_emf_constant_Vs_rad * speed == pytest.approx(sqrt(3) * k * speed, rel=1e-14)
-    assert motor.torque_constant_Nm_A == pytest.approx(motor.back_emf_constant_Vs_rad, rel=1e-14)
 
 
 def test_a_warm_motor() -> None:

@@ -35,15 +35,9 @@ USUAL = 400
 
 
 @pytest.mark.parametrize("target", targets(), ids=lambda target: target.name.replace(" ", "-"))
-def test_the_inputs_that_are_damaged_are_good(target: Target, tmp_path) -> None:
-    for k, seed in enumerate(target.seeds):
-        path = tmp_path / f"{k}{target.suffix}"
-        path.write_bytes(seed)
-        target.attack(path)
-
-
-@pytest.mark.parametrize("target", targets(), ids=lambda target: target.name.replace(" ", "-"))
 def test_whatever_a_file_holds_it_is_taken_or_refused_in_one_line(target: Target) -> None:
+    for seed in target.seeds:  # what is damaged is good
+        target.attack(written(seed, target.suffix))
     count = LINES if target.name == "command line" else INPUTS.get(target.name.partition(" ")[0], USUAL)
     finds = [find for number in range(count) if (find := attack(target, SEED, number)) is not None]
     assert finds == []

@@ -15,7 +15,6 @@ from analyses.linear.loop_figures import all_loop_figures
 from analyses.linear.loop_survey import with_cogging
 from analyses.specification.requirements import evaluate_requirements
 from reports import document as doc
-from reports.build import design_report
 from reports.sections import answer, limits
 from reports.sections.in_time import remark
 from reports.sections.requirements import item
@@ -124,22 +123,6 @@ def test_findings_come_from_the_sections_gravest_first_once_and_in_turns() -> No
 def test_a_motion_that_keeps_oscillating_is_told_in_the_words_of_the_field(more: Any, said: str) -> None:
     item = AmplitudeMargin(loop="position", linear=10.0, furthest=40.0, period_s=1e-4, **more)
     assert remark(item) == said
-
-
-def test_a_report_without_simulation_says_so() -> None:
-    result = glance(design_report(load_design("emps")))["findings"]
-    assert any("No simulation stands behind this report" in item["text"] for item in result)
-
-
-def test_an_unmet_requirement_is_the_weakest_point_and_fails_the_screen() -> None:
-    design = load_design("ilr33-amber")
-    asked = [replace(one, minimum=90.0) for one in design.requirements if one.quantity == "phase_margin"]
-    others = [one for one in design.requirements if one.quantity != "phase_margin"]
-    document = design_report(replace(design, requirements=(*asked, *others)))
-    assert document["sections"][0]["status"] == "fail"
-    words = "phase margin 73.7 deg, required 90 deg: 16.3 deg below"
-    wanted = {"status": "fail", "label": "Velocity loop", "words": words}
-    assert glance(document)["weakest"].items() >= wanted.items()
 
 
 def test_every_section_opens_with_one_sentence_that_says_its_result(built: Built) -> None:

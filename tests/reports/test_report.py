@@ -202,6 +202,7 @@ def test_an_unstable_design_is_called_unstable_and_still_drawn() -> None:
 
 def test_a_linear_axis_is_told_in_its_own_units() -> None:
     document = design_report(load_design("emps"))
+    assert "No simulation stands behind this report" in str(document["sections"][0])
     (table, *_) = next(one["blocks"] for one in document["sections"] if one["id"] == "operating-points")
     assert [column["unit"] for column in table["columns"][1:3]] == ["N", "N s/m"]
     assert table["rows"][0]["slope"] == pytest.approx(203.5034)  # viscous friction, published

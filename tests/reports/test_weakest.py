@@ -1,5 +1,6 @@
 """The weakest point is the worst of all views, by how near L comes to -1; the spread names its points."""
 
+import re
 from dataclasses import replace
 from functools import cache
 from math import inf, log10, radians, sin
@@ -31,6 +32,7 @@ FIN = replace(load_design("fin"), requirements=())
 
 
 surveyed = cache(lambda name: survey_loops(load_design(name)))
+cornered = cache(lambda: corners(FIN))
 
 
 @pytest.fixture
@@ -57,7 +59,7 @@ def test_margins_are_not_ranked_by_shares_of_decibels() -> None:
 
 
 def test_every_view_is_looked_at(survey: LoopSurvey) -> None:
-    seen = {(view.place, view.loop, view.cut) for view in views(survey, corners(FIN))}
+    seen = {(view.place, view.loop, view.cut) for view in views(survey, cornered())}
     for place in ("", "load driven by the motor", "motor driven by the load", "in the gap of the play"):
         assert (place, "position", "") in seen
     assert any(place.startswith("at rest, dry friction over 1 rad/s, load ") for place, _, _ in seen)
@@ -68,7 +70,7 @@ def test_every_view_is_looked_at(survey: LoopSurvey) -> None:
 
 def test_the_weakest_point_of_the_fin_is_where_it_is_not_stable(survey: LoopSurvey) -> None:
     """Its position loop is unstable at the worst tolerances; without them the driven point is nearest."""
-    point = weakest(survey, corners(FIN))
+    point = weakest(survey, cornered())
     assert (point.reserve, point.view.stable) == (-inf, False)
     assert words_of(point)["status"] == "warn"
     nominal = weakest(survey)
@@ -106,7 +108,9 @@ def test_a_required_limit_stands_for_the_customary_one(survey: LoopSurvey) -> No
     asked = Requirement(id="m", quantity="modulus_margin", unit="1", loop="every", minimum=0.7)
     point = weakest(replace(survey, design=replace(FIN, requirements=(asked,))))
     assert (point.view.place, point.view.loop, point.limit, point.required) == ("", "position", 0.7, True)
-    assert words_of(point)["status"] == "fail"
+    told = words_of(point)
+    assert (told["status"], told["label"]) == ("fail", "Position loop")
+    assert re.fullmatch(r"modulus margin 0\.\d+, required 0\.7: 0\.\d+ below", told["words"])
 
 
 def test_the_spread_is_that_of_the_operating_points_which_margins_names(cli) -> None:
@@ -170,13 +174,15 @@ def test_a_requirement_that_is_not_met_without_a_figure_has_the_first_bar() -> N
     about = {"limit": 6.0, "comparison": ">=", "unit": "dB"}
     given = (("a", False, 5.0), ("b", False, None), ("c", None, None))
     items = [verdict(id, id, passed=passed, value=value, **about) for id, passed, value in given]
-    (glance,) = first_screen({}, items, [])["blocks"]
+    screen = first_screen({}, items, [])
+    assert screen["status"] == "fail"
+    (glance,) = screen["blocks"]
     assert [bar["id"] for bar in glance["bars"]] == ["b", "a"]
 
 
 def test_no_move_that_costs_a_requirement(survey: LoopSurvey) -> None:
     """Less position gain mends the fin at its worst tolerances; with the bandwidth required, nothing does."""
-    bounds = corners(FIN)
+    bounds = cornered()
     point = weakest(survey, bounds)
     assert mending(point, survey, bounds).path == "control.position.gain"
     assert mending(point, replace(survey, design=load_design("fin")), bounds) is None

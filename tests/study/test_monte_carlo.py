@@ -114,8 +114,9 @@ def test_what_samples_do_not_prove_can_be_waived(study):
 def test_the_terminal_says_verdict_and_reason(study):
     made = brief(study)
     rows = {row["label"]: row["verdict"] for row in made.blocks[0]["rows"]}
-    assert rows["motor current, at 8 N m"] == "not met"
-    reason = next(note for note in made.notes if note.startswith("Motor current, at 8 N m: "))
+    what = "Drive: motor current at top speed at 8 N m"
+    assert rows[what] == "not met"
+    reason = next(note for note in made.notes if note.startswith(f"{what}: "))
     assert "samples fail, worst is number" in reason
 
 
