@@ -12,8 +12,8 @@ from actuator_lti.types import Floats, Progress
 from analyses.estimation.least_squares import scaled_lstsq
 from analyses.estimation.parameters import default_value
 from analyses.identification.design_values import design_value, kept_constant
+from analyses.identification.points import SteadyPoint, steady_point
 from analyses.identification.richer import RicherLaws, compare_laws
-from analyses.identification.steady import SteadyPoint, steady_point
 from analyses.identification.surface import NAMES, SurfaceFit, fit_surface
 from analyses.identification.verdict import Item, kept_items, residual_item, simulated_item, size_item
 from analyses.records.campaign_import import ImportedCampaign, ImportedRun, SetAside

@@ -24,7 +24,7 @@ from analyses.identification.electrical import (
     fit_electrical,
     without_own_bias,
 )
-from analyses.identification.friction_map import fit_map
+from analyses.identification.friction_law import fit_map
 from analyses.identification.held_command import found_together, motion_of, motor_of
 from analyses.identification.inverse import fit_records
 from analyses.identification.joint_model import NAMES, FrictionForm, JointModel, Recipe

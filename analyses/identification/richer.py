@@ -6,7 +6,7 @@ from math import nan
 import numpy as np
 
 from actuator_lti.types import Floats, Mask
-from analyses.identification.shared_errors import with_shared
+from analyses.identification.points import with_shared
 from analyses.identification.surface import SurfaceFit
 
 FOLDS = 9

@@ -11,8 +11,7 @@ from actuator_lti.types import Floats
 from analyses.estimation.fit import Fit, Fixed
 from analyses.estimation.least_squares import told_apart
 from analyses.estimation.parameters import parameter
-from analyses.identification.shared_errors import half_widths, shared_errors, standardised
-from analyses.identification.steady import SteadyPoint
+from analyses.identification.points import SteadyPoint, half_widths, shared_errors, standardised
 from analyses.records.campaign_file import Instruments
 
 NAMES = ("C0", "Cv", "CM")

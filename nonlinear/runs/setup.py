@@ -170,9 +170,10 @@ def _put_load(row: Floats, given: float | LoadMoment, tables: Tables) -> None:
     row[at.LOAD] = load.constant_Nm
     row[at.LOAD_SLOPE] += load.slope_Nm_rad
     if load.series is not None:
-        table = load.series.table(float(row[at.PERIOD]), int(row[at.TICKS]))
-        if table is not None:
-            row[at.LOAD_TABLE], row[at.LOAD_TABLE_LENGTH] = tables.add(table)
+        clock = float(row[at.PERIOD]), int(row[at.TICKS])
+        table = load.series.table(*clock)
+        values = load.series.values(*clock) if table is None else table
+        row[at.LOAD_TABLE], row[at.LOAD_TABLE_LENGTH] = tables.add(values)
 
 
 def put_torque(row: Floats, torque_Nm: npt.ArrayLike, tables: Tables) -> None:

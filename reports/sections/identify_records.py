@@ -7,9 +7,8 @@ import numpy as np
 from analyses.estimation.parameters import default_value, parameter
 from analyses.identification.bench import BenchResult
 from analyses.identification.design_values import DesignValue, given_constant
-from analyses.identification.friction_map import LawChoice
 from analyses.identification.inverse import SIGNED
-from analyses.identification.joint_model import JointModel, RecordFit
+from analyses.identification.joint_model import JointModel, LawChoice, RecordFit
 from analyses.identification.residuals import ResidualTest
 from analyses.records.consistency import left_out_of
 from reports import document as doc

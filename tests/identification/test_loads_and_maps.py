@@ -14,7 +14,7 @@ from analyses.estimation.fit import Fit
 from analyses.identification.asked import Settings
 from analyses.identification.bench import identify_bench
 from analyses.identification.electrical import electrical_slopes, fit_electrical
-from analyses.identification.friction_map import fit_map
+from analyses.identification.friction_law import fit_map
 from analyses.identification.inverse import fit_records
 from analyses.identification.rows import recipe_for
 from analyses.identification.to_design import design_with_fit, joint_values, with_structure

@@ -20,7 +20,7 @@ from analyses.identification.friction_law import bend_of
 from analyses.identification.inverse import fit_records
 from analyses.identification.output_error import fit_output
 from analyses.identification.plan import PERIOD_S, Plan, plan_motions
-from analyses.identification.steady import SteadyPoint
+from analyses.identification.points import SteadyPoint
 from analyses.identification.surface import SurfaceFit, fit_surface
 from analyses.identification.to_design import design_with_fit, joint_values
 from analyses.records.campaign_file import Instruments

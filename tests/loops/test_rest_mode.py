@@ -2,6 +2,7 @@
 
 import warnings
 from dataclasses import replace
+from itertools import product
 from typing import Any
 
 import control
@@ -26,6 +27,7 @@ from tests.validation.random_drives import full_drive
 
 TICK = 1e-4
 SLOPES = (-6000.0, -100.0, -0.1, 50.0)
+FORMS = ("sampled", "ideal", "continuous")
 WEAK = (-1e-14, -1e-10, -1e-6, -1e-2, 1e-14, 1e-10, 1e-6)
 CURRENT = {"current": model.CurrentLoop(gain_V_A=0.5, integral_time_s=1e-3)}
 
@@ -37,8 +39,7 @@ def at_rest(design: Any) -> float:
     return law.gain / law.integral_time_s * motor.torque_constant_Nm_A / stiffness
 
 
-@pytest.mark.parametrize("slope", [*SLOPES, *WEAK])
-@pytest.mark.parametrize("form", ["sampled", "ideal", "continuous"])
+@pytest.mark.parametrize(("form", "slope"), [*product(FORMS, SLOPES), *(("sampled", weak) for weak in WEAK)])
 def test_the_velocity_loop_has_the_gain_at_zero_that_the_spring_gives(form: Any, slope: float) -> None:
     design = sprung("ilr33-amber", slope)
     loop, L0 = assemble_loops(design, form=form).velocity, at_rest(design)

@@ -45,6 +45,17 @@ def test_values(command: Command, expected: np.ndarray) -> None:
     np.testing.assert_allclose(command.values(TS, T.size), expected, atol=1e-9)
 
 
+def test_any_command_may_be_a_load() -> None:
+    fin, t = load_design("fin"), np.arange(400) * load_design("fin").controller.period_s
+    given = (
+        loads.LoadMoment(series=commands.sine(20.0, 30.0)),
+        loads.series(t, 20.0 * np.sin(60.0 * np.pi * t)),
+    )
+    one, other = (simulate(fin, commands.hold(), t.size * fin.controller.period_s, load) for load in given)
+    assert np.ptp(one.motor_angle_rad) > 1e-3
+    assert one.motor_angle_rad == pytest.approx(other.motor_angle_rad, abs=1e-9)
+
+
 @pytest.mark.parametrize("frequency_hz", [1e-3, 0.7, 31.0, 499.0, 7e5])
 def test_a_sine_is_right_to_its_last_digits(frequency_hz: float) -> None:
     values = commands.sine(1.0, frequency_hz, 0.3).values(TS, T.size)

@@ -56,6 +56,12 @@ def test_the_threshold_is_where_steps_stop_settling(conditional: Conditional) ->
         assert bool(left > 1.0) is not settles
 
 
+def test_lower_gain_margin_by_hand(conditional: Conditional) -> None:
+    """Stable above g = 1/(w_v (Tn + 1/Kv)), w_v = Kp kM/J, by Routh: the delay-free cubic, within 3 %."""
+    by_hand = 1.0 / (2.5 * 0.02 / 1e-3 * (0.041 + 1.0 / 24.0))
+    assert conditional.margins["i_ref"].gain_lower == pytest.approx(by_hand, rel=0.05)
+
+
 def test_the_describing_function_predicts_the_limit_cycle(conditional: Conditional) -> None:
     """First harmonic only: amplitude and frequency of the limit cycle within a fifth."""
     (one,) = conditional.predictions
