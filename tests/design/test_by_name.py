@@ -3,7 +3,6 @@
 import pickle
 from contextlib import nullcontext
 from importlib import import_module
-from pathlib import Path
 from xml.etree import ElementTree
 
 import control
@@ -198,12 +197,6 @@ def test_a_notebook_shows_designs_loops_and_margins_and_texts_of_a_file_become_n
     shown = cells(margins._repr_html_())
     assert shown[0] == "closed loop: stable"
     assert f"{margins.phase_margin_deg:.4g} deg" in shown
-
-
-def test_every_package_says_that_it_has_types() -> None:
-    root = Path(__file__).parents[2]
-    for package in ("actuator_lti", "nonlinear", "analyses", "reports"):
-        assert (root / package / "py.typed").exists()
 
 
 @pytest.mark.parametrize("path", paths_of(DESIGN))

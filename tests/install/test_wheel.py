@@ -85,6 +85,7 @@ def test_nothing_that_is_needed_is_left_out_and_nothing_else_installed(built) ->
     names, inside, _ = built
     wanted = needed()
     some = {"reports/templates/report.html", "nonlinear/export/wasm/drive.wasm", "nonlinear/native.py"}
+    some |= {f"{package}/py.typed" for package in PACKAGES}
     assert some | {"actuator_lti/design/shipped/ilr33-amber.toml"} <= wanted
     assert wanted - names == set()
     assert wanted - inside == set()

@@ -56,18 +56,26 @@ def fresh(opens) -> Any:
 
 
 @pytest.fixture(scope="module")
-def amber(browser, once) -> Iterator[Any]:
+def shared(browser, once) -> Iterator[Callable[[Design], Any]]:
+    """Pages of designs, each opened once for all tests of a file: values are put back, history is kept."""
     trouble: list[str] = []
-    made = opened(browser, written(AMBER, once), trouble)
-    made.done()
-    yield made
-    made.context.close()
+    pages: dict[Design, Any] = {}
+
+    def call(design: Design) -> Any:
+        if design not in pages:
+            pages[design] = opened(browser, written(design, once), trouble)
+        pages[design].done()
+        if pages[design].is_enabled('[data-do="reset"]'):
+            pages[design].does("reset")
+        return pages[design]
+
+    yield call
+    for page in pages.values():
+        page.context.close()
     assert trouble == []
 
 
 @pytest.fixture
-def page(amber) -> Iterator[Any]:
-    """One for all tests of a file: its values are put back behind each, what was undone is still known."""
-    yield amber
-    if amber.is_enabled('[data-do="reset"]'):
-        amber.does("reset")
+def page(shared) -> Any:
+    """The page of ilr33-amber, with its values."""
+    return shared(AMBER)

@@ -18,7 +18,7 @@ def ask(page: Page, kind: str, **values: float) -> dict[str, float]:
         page.settled(lambda: page.select_option(".run-kind", kind))
     for label, value in values.items():
         field = page.locator(".run-keys label", has_text=label).locator("input")
-        if field.input_value().replace(".", "").strip("0") != repr(value).replace(".", "").strip("0"):
+        if field.input_value() not in (repr(value), f"{value:g}"):
             page.settled(lambda field=field, value=value: (field.fill(repr(value)), field.press("Enter")))
     return last(page)
 

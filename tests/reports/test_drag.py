@@ -5,10 +5,9 @@ The truth is the axis: what lies between two places on a scale in dB is a factor
 
 import math
 import re
-from collections.abc import Iterator
 
 import pytest
-from live_page import AMBER, FIGURES, LIVE, Page, command_line, opened, written
+from live_page import AMBER, FIGURES, LIVE, Page, command_line
 
 from actuator_lti import load_design
 from actuator_lti.design import with_values
@@ -32,24 +31,18 @@ SCALE = """([chart, k]) => {
 }"""
 
 
-@pytest.fixture(scope="module")
-def notched(browser, once) -> Iterator[Page]:
-    turn, trouble = 2.0 * math.pi, list[str]()
-    notch = Filter(kind="notch", frequency_rad_s=turn * 200.0, width_rad_s=turn * 60.0, depth=0.3)
-    design = changed(AMBER, controller={"velocity": {"filters": (notch,)}})
-    made = opened(browser, written(design, once), trouble)
-    made.settled(lambda: made.locator(".tabs button", has_text="Velocity").click())
-    yield made
-    made.context.close()
-    assert trouble == []
+TURN = 2.0 * math.pi
+NOTCH = Filter(kind="notch", frequency_rad_s=TURN * 200.0, width_rad_s=TURN * 60.0, depth=0.3)
+NOTCHED = changed(AMBER, controller={"velocity": {"filters": (NOTCH,)}})
 
 
 @pytest.fixture
-def page(notched: Page) -> Iterator[Page]:
-    notched.locator('[data-chart="bode"]').scroll_into_view_if_needed()
-    yield notched
-    if notched.is_enabled('[data-do="reset"]'):
-        notched.does("reset")
+def page(shared) -> Page:
+    result = shared(NOTCHED)
+    for tab in result.locator('.tabs [data-loop="velocity"][aria-pressed="false"]').all():
+        result.settled(tab.click)
+    result.locator('[data-chart="bode"]').scroll_into_view_if_needed()
+    return result
 
 
 def drag(page: Page, at: tuple[float, float], dx: float, dy: float) -> None:

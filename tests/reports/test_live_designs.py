@@ -107,10 +107,10 @@ def test_every_key_of_any_drive_is_followed_but_the_seed_of_its_noise(seed: int)
     assert unknown <= {"instruments.seed"}
 
 
-def test_periodic_break_points_follow_once_nothing_moves(opens) -> None:
+def test_periodic_break_points_follow_once_nothing_moves(shared) -> None:
     """Their fundamental has the margins of the command line's; while a value moves the row says so."""
     design, key = load_design("ilr33-amber-multirate"), "control.current.gain"
-    page = opens(design)
+    page = shared(design)
     page.type_value(key, 2e-2)
     changed = with_values(design, {key: 2e-2 * page.sliders()[key]["factor"]}, check=False)
     wanted = stability_margins(assemble_loops(changed).break_points["i_ref"].open_loop)
@@ -144,9 +144,9 @@ def test_cogging_is_seen_on_a_crest_in_a_notch_and_in_motion(opens, tmp_path) ->
     assert f"Unstable {crest}: current, velocity, position." in page.inner_text(".state")
 
 
-def test_where_rounding_decides_no_figure_is_shown(opens, tmp_path) -> None:
+def test_where_rounding_decides_no_figure_is_shown(shared, tmp_path) -> None:
     """An unstable current loop between slow updates: the command line withholds, so does the page."""
-    page, key = opens(load_design("ilr33-amber-multirate")), "control.current.gain"
+    page, key = shared(load_design("ilr33-amber-multirate")), "control.current.gain"
     page.type_value(key, 60.0 * page.field(key))
     page.type_value("control.position.every", 20)
     file = page.saved(tmp_path / "hot.toml")
@@ -157,8 +157,8 @@ def test_where_rounding_decides_no_figure_is_shown(opens, tmp_path) -> None:
     assert page.get_attribute(".state", "class") == "state fail"
 
 
-def test_whole_numbers_stay_whole_and_multiples(opens, tmp_path) -> None:
-    page = opens(load_design("ilr33-amber-multirate"))
+def test_whole_numbers_stay_whole_and_multiples(shared, tmp_path) -> None:
+    page = shared(load_design("ilr33-amber-multirate"))
     row, before = '.row[data-path="control.velocity.every"]', page.read()
     page.type_value("control.velocity.every", 3)  # 10 is no multiple of 3
     assert "allowed: a multiple of control.velocity.every = 3" in page.inner_text(".state")
