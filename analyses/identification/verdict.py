@@ -219,7 +219,8 @@ def size_item(design: Design, values: Sequence[DesignValue], *, kept_constants: 
             reasons.append(with_factor(off, one.ratio, known))
         elif kind == "dry" and one.ratio > (MOST_DRY_UNLOADED if feels else LARGEST_FACTOR):
             load = (one.found - one.design) / max(design.friction.load_coefficient, 1e-300)
-            reasons.append(off + (f": as under a load of {load:.3g} N m, not recorded" if feels else ""))
+            told = f": as under a load of {load:.3g} {design.load_unit}, not recorded"
+            reasons.append(off + told * feels)
     label, passed = "Identified values are of the design's size", not reasons if values else None
     return Item(id="size", label=label, passed=passed, reason=next(iter(reasons), ""))
 
