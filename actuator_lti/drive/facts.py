@@ -11,7 +11,7 @@ from typing import Any
 from actuator_lti.design.model import Design
 from actuator_lti.drive.choice import finite, larger, smaller, where
 from actuator_lti.drive.operating import Operating, dry_torque, friction_slopes, stiffness_there, train_gain
-from actuator_lti.drive.steady import circuit_resistance_ohm, droop, winding
+from actuator_lti.drive.steady import back_emf_Nms_rad, circuit_resistance_ohm, drive_gain, droop, winding
 from actuator_lti.drive.wiring import present
 from actuator_lti.errors import InputError
 
@@ -35,14 +35,14 @@ class Capability:
 
 
 def stall_torque_Nm(design: Design) -> Any:
-    """Largest motor torque at rest; ``inf`` without a limit."""
+    """Largest motor torque at rest; ``inf`` without a limit. A P current loop falls short of its command."""
     motor, limits = design.effective_motor, design.limits
     if motor.source_gain_Nm_V is not None:
         return motor.source_gain_Nm_V * limits.voltage_V
-    current = limits.voltage_V / circuit_resistance_ohm(design)
+    torque = winding(motor)[1] * limits.voltage_V / circuit_resistance_ohm(design)
     if design.controller.current is not None:
-        current = smaller(current, limits.peak_current_A)
-    return winding(motor)[1] * current
+        torque = smaller(torque, drive_gain(design) * limits.peak_current_A)
+    return torque
 
 
 def resonance_rad_s(design: Design, load_Nm: float = 0.0) -> Any:
@@ -131,7 +131,8 @@ def _top_speed(design: Design, against: Any, slopes: list[tuple[float, Any]]) ->
         if (pulls := droop(design)) is not None:
             rises = _first_root(against - pulls[0], slopes, pulls[1])
             bounds.append((DROOP, where(pulls[0] > against, rises, 0.0)))
-    bounds.append((FORCE, _first_root(against - stall, slopes, 0.0)))
+    falls = 0.0 if design.controller.current is None else back_emf_Nms_rad(design)
+    bounds.append((FORCE, _first_root(against - stall, slopes, falls)))
     if motor.source_gain_Nm_V is None:
         R, (_, kM, kE) = circuit_resistance_ohm(design), winding(motor)
         bounds.append((VOLTAGE, _first_root(against - kM * limits.voltage_V / R, slopes, kM * kE / R)))

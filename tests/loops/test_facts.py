@@ -190,6 +190,19 @@ def test_a_p_velocity_loop_stays_below_its_limit_by_its_droop(name: str) -> None
     assert ran.motor_speed_rad_s[-1] == pytest.approx(w, rel=1e-6)
 
 
+def test_a_p_current_loop_gives_less_than_the_peak_that_is_asked_of_it() -> None:
+    """kM (K i_peak - kE w)/(R + K), the command at its limit, against friction; and where a run ends up."""
+    motor, figures, peak = PLAIN.motor, drive_figures(PLAIN), PLAIN.limits.peak_current_A
+    w = figures.output_rate_rad_s * PLAIN.total_ratio
+    volts = GAIN * peak - motor.back_emf_constant_Vs_rad * w
+    assert motor.torque_constant_Nm_A * volts / (0.055 + GAIN) == pytest.approx(C0 + CV * w, rel=1e-11)
+    stall = motor.torque_constant_Nm_A * GAIN * peak / (0.055 + GAIN)
+    assert stall_torque_Nm(PLAIN) == pytest.approx(stall, rel=1e-12)
+    assert figures.rate_limit == "force"
+    ran = simulate(PLAIN, commands.ramp(20.0), 2.0)
+    assert ran.motor_speed_rad_s[-1] == pytest.approx(w, rel=1e-6)
+
+
 def test_an_integral_or_a_drive_without_friction_leaves_no_droop() -> None:
     """Kp (w_lim - w) is nothing where nothing holds the motor back: a current integral feeds the back-EMF."""
     free = controlled(amber(friction=model.Friction()), velocity={"integral_time_s": None})
