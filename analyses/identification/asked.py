@@ -24,7 +24,7 @@ Of = Literal["L", "T", "S", "closed"]
 class Settings:
     """What is looked for in records of a motion, and how."""
 
-    fix: Annotated[list[str] | None, Option("Hold a key at a value; repeatable.", "KEY=VALUE")] = None
+    fix: Annotated[list[str] | None, Option("Hold a value: friction.viscous=0; repeatable.", "KEY=VALUE")] = None
     residual_limit: Annotated[float, Option("Largest relative residual of a written design; 20.", "%")] = 20.0
     inertia_to: Annotated[
         str,
@@ -109,7 +109,7 @@ class Asked(Settings):
     play: Annotated[
         Path | None, Option("With --frequency-response: a reversing motion, both angles.", "RECORD")
     ] = None
-    period_s: Annotated[float | None, Option("Period of the excitation; that of the command.", "s")] = None
+    period_s: Annotated[float | None, Option("Period of the excitation; found from the command.", "s")] = None
     plan: Annotated[
         bool, Option("FILE is a design: motions that tell its values as closely as asked (then records).")
     ] = False
