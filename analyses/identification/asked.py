@@ -24,7 +24,9 @@ Of = Literal["L", "T", "S", "closed"]
 class Settings:
     """What is looked for in records of a motion, and how."""
 
-    fix: Annotated[list[str] | None, Option("Hold a value: friction.viscous=0; repeatable.", "KEY=VALUE")] = None
+    fix: Annotated[
+        list[str] | None, Option("Hold a value, as friction.viscous=0; repeatable.", "KEY=VALUE")
+    ] = None
     residual_limit: Annotated[float, Option("Largest relative residual of a written design; 20.", "%")] = 20.0
     inertia_to: Annotated[
         str,
