@@ -25,8 +25,6 @@ def section(result: Duty) -> doc.Section:
     note = f"Duty: {asked_words(result)}."
     if runs(result.design) and follows_angle(result.design) and result.asked.share < 1.0:
         note += " The load turns with the drive: this is one motion of many, which begin at other angles."
-    if not result.steady:
-        note += " The motion is not steady where its simulation ends: it is not judged."
     if result.heating is None:
         note += " No winding temperature: the design states no temperature.thermal_resistance."
     if result.overload is None:
@@ -69,6 +67,7 @@ def asked_words(result: Duty) -> str:
 def summary(result: Duty) -> str:
     limited = f"; it is not followed as asked, limited by {' and '.join(result.limited)}"
     said = f"{asked_words(result)} is {RATED[result.rated]}: {_found(result)}"
+    said += "" if result.steady else "; the motion is not steady where its simulation ends"
     return said + limited * bool(result.limited) + f". {requirements.result(result.requirements)}".rstrip()
 
 

@@ -210,6 +210,8 @@ def test_a_slow_integral_is_waited_for_or_the_duty_is_not_judged(monkeypatch: py
     monkeypatch.setattr("analyses.duty.run.MOST_WAITED", 10 * ticks)
     short = duty(design, asked)
     assert (short.steady, short.rated) == (False, Verdict.NOT_PROVEN)
+    assert "not judged" in section(short)["result"]
+    assert "is not steady" in section(short)["result"]
 
 
 @pytest.mark.parametrize(("share", "cycle_s"), [(0.4, 3.0), (0.4, 40.0), (1.0, 1.0)])
