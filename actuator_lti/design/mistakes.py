@@ -128,9 +128,9 @@ class Findings:
         return self.lines.get(path, 0)
 
 
-def meant_of(word: str, known: Iterable[str]) -> str:
+def meant_of(word: str, known: Iterable[str], alike: float = 0.65) -> str:
     every = list(known)
-    return word if word in every else next(iter(get_close_matches(word, every, 1, 0.65)), "")
+    return word if word in every else next(iter(get_close_matches(word, every, 1, alike)), "")
 
 
 def nearest(word: str, known: Iterable[str]) -> str:

@@ -130,7 +130,7 @@ class Reader:
                 self.ticks[f"{path}.every"] = ticks
             only = _ASIDE.split(word)[0] if word else meant_of(key, known)
             if only in known:
-                near = word or get_close_matches(key, [only], 1, _VERY_NEAR)
+                near = word or meant_of(key, [only], _VERY_NEAR)
                 meant[only] = meant.get(only) or (key if near else "")
                 self.guessed |= set() if word else {f"{path}.{only}"}
                 continue
@@ -321,9 +321,7 @@ class Reader:
         return int(value) if field.kind == "integer" else value
 
     def limit(self, quantity: Any, raw: Any, path: str) -> Any:
-        exact = [quantity] if isinstance(quantity, str) and quantity in QUANTITIES else []
-        near = exact or get_close_matches(f"{quantity}", QUANTITIES, 1, _VERY_NEAR)
-        known = QUANTITIES[near[0]] if near else None
+        known = QUANTITIES.get(meant_of(f"{quantity}", QUANTITIES, _VERY_NEAR))
         if isinstance(raw, bool) or not isinstance(raw, str | int | float):
             return self.refuse(path, raw, "allowed: a number with its unit, as text")
         try:

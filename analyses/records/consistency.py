@@ -3,6 +3,7 @@
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
+from functools import partial
 from math import inf, isfinite
 
 import numpy as np
@@ -92,7 +93,9 @@ def check_record(design: Design, record: Record) -> tuple[Finding, ...]:
     known factor explains is named.
     """
     design, as_read = record.drive(design), record.as_read or record
-    checks = (_rate, _still, _time, _clock, _reduction, _electrical, _sign, _command, _supply)
+    ratio = rate_ratio(design, record)
+    rate, electrical = partial(_rate, ratio), partial(_electrical, abs(_doubt(design, record, ratio)))
+    checks = (rate, _still, _time, _clock, _reduction, electrical, _sign, _command, _supply)
     steps = _steps(design, record)  # a row that is lost at full speed looks like a jump
     steps = steps if steps and steps.passed is False else _jumps(design, as_read) or steps
     found = (_rows(as_read), steps, *(check(design, record) for check in checks), *_limits(design, as_read))
@@ -188,9 +191,9 @@ def _bounds(y: Floats, x: Floats, beside_x: Floats, beside_y: Floats) -> tuple[f
     return min(all_ends), max(all_ends)
 
 
-def _rate(design: Design, record: Record) -> Finding | None:
+def _rate(ratio: RateRatio | None, design: Design, record: Record) -> Finding | None:
     name = RATES[design.axis]
-    if (ratio := rate_ratio(design, record)) is None:
+    if ratio is None:
         return None
     subject, off = f"{name} against the rate of the {ratio.place}", ratio.found - 1.0
     if abs(ratio.alike) < ALIKE:
@@ -228,7 +231,11 @@ def _still(design: Design, record: Record) -> Finding | None:
 
 def clock_doubt(design: Design, record: Record) -> float:
     """The share by which a record's clock may be off: of its speed, or of its period from whole ticks."""
-    if (rate := rate_ratio(design, record)) is not None:
+    return _doubt(design, record, rate_ratio(design, record))
+
+
+def _doubt(design: Design, record: Record, rate: RateRatio | None) -> float:
+    if rate is not None:
         return rate.doubt
     ticks = record.period_s / design.controller.period_s
     off = ticks / max(round(ticks), 1) - 1.0
@@ -397,9 +404,12 @@ def _electrical_parts(design: Design, record: Record) -> dict[str, tuple[float, 
     return {"R i + kE w": _bounds(u, total, np.gradient(total), np.gradient(u))}
 
 
-def _electrical(design: Design, record: Record) -> Finding | None:
-    """Voltage, current and motion through R, L and kE, at the accuracy of the signals and of the design."""
-    if not (told := _voltage_told(design, record)):
+def _electrical(doubt: float, design: Design, record: Record) -> Finding | None:
+    """Voltage, current and motion through R, L and kE, at the accuracy of the signals and of the design.
+
+    ``doubt`` is the share by which the clock may be off.
+    """
+    if not (told := _voltage_told(design, record, doubt)):
         return None
     (passed, words), u, i = told, record["voltage"], record["current"]
     for cause, changed in (
@@ -409,7 +419,7 @@ def _electrical(design: Design, record: Record) -> Finding | None:
         ("the columns of current and voltage are swapped", {"voltage": i, "current": u}),
     ):
         other = replace(record, signals={**record.signals, **changed})
-        if passed is False and (instead := _voltage_told(design, other)) and instead[0] is not False:
+        if passed is False and (instead := _voltage_told(design, other, doubt)) and instead[0] is not False:
             return Finding("voltage against R i + kE w", False, f"{words}: {cause}")
     if passed is None and (stands := _standing_current(design, record)):
         passed, words = False, stands
@@ -418,11 +428,10 @@ def _electrical(design: Design, record: Record) -> Finding | None:
     return Finding("voltage against R i + kE w", passed, words)
 
 
-def _voltage_told(design: Design, record: Record) -> tuple[bool | None, str] | None:
+def _voltage_told(design: Design, record: Record, doubt: float) -> tuple[bool | None, str] | None:
     """Whether each part of the voltage counts once, and in words; None where nothing tells."""
-    doubts = {"kE w": abs(clock_doubt(design, record))}
     parts = _electrical_parts(design, record).items()
-    told = [_counted(design, name, *ends, doubts.get(name, 0.0)) for name, ends in parts]
+    told = [_counted(design, name, *ends, doubt if name == "kE w" else 0.0) for name, ends in parts]
     each = [one for one, _ in told]
     passed = False if False in each else None if None in each else True
     return (passed, "; ".join(words for _, words in told)) if told else None
@@ -484,8 +493,9 @@ def _counted(
     kelvin = (ratio - 1.0) / COPPER_1_K
     warm = name == "R i" and WINDING_K[0] < kelvin < WINDING_K[1]
     if warm:
-        text += f": a winding {kelvin:+.0f} K from the design's, "
-        text += f"or a current {1.0 / ratio:.3g} times the real"
+        text += (
+            f": a winding {kelvin:+.0f} K from the design's, or a current {1.0 / ratio:.3g} times the real"
+        )
     return (None if warm else False), with_factor(text, 1.0 / ratio if ratio > 0.0 else 0.0)
 
 

@@ -28,6 +28,11 @@ _BEHIND = (
 )
 
 
+def limiters_of(flags: int) -> tuple[str, ...]:
+    """Limiters whose flags are set."""
+    return tuple(name for name, bit in zip(at.LIMITERS, at.LIMITER_BITS, strict=True) if flags & bit)
+
+
 @dataclass(frozen=True)
 class Piece:
     """Some ticks of a run, one entry every so many."""
@@ -44,8 +49,7 @@ class Piece:
     @property
     def limited(self) -> tuple[str, ...]:
         """Limiters that acted within it."""
-        bits = zip(at.LIMITERS, at.LIMITER_BITS, strict=True)
-        return tuple(name for name, bit in bits if (self.flags & bit).any())
+        return limiters_of(int(np.bitwise_or.reduce(self.flags)))
 
 
 @dataclass(eq=False)

@@ -21,8 +21,10 @@ question is asked of the whole state, and the drive is followed until it is answ
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import reduce
 from itertools import pairwise
 from math import inf
+from operator import or_
 from typing import Literal
 
 import numpy as np
@@ -30,7 +32,7 @@ import numpy as np
 from actuator_lti.errors import InputError
 from actuator_lti.types import Floats
 from nonlinear._kernels import layout as at
-from nonlinear.runs.running import Piece, Running
+from nonlinear.runs.running import Piece, Running, limiters_of
 from nonlinear.settling import drift
 
 Verdict = Literal["at rest", "limit cycle", "still moving", "diverging"]
@@ -357,7 +359,6 @@ class _Watch:
         acted = self._late()[: 1 if still else None]
         end = followed[-1] if still else 0.5 * (followed.max() + followed.min())
         orders = max(p[at.HAS_POSITION], p[at.HAS_VELOCITY], p[at.HAS_CURRENT]) > 0.0  # a voltage: nothing
-        limits = zip(at.LIMITERS, at.LIMITER_BITS, strict=True)
         return Rest(
             verdict=verdict,
             error=float(command[-1] - end) if orders else 0.0,
@@ -365,7 +366,7 @@ class _Watch:
             motor_amplitude=0.0 if still else 0.5 * float(np.ptp(motor)),
             frequency_hz=swing.frequency_hz if swing is not None and verdict == "limit cycle" else None,
             periods=0 if swing is None else swing.periods,
-            limited=tuple(name for name, bit in limits if any(flags & bit for _, flags, _ in acted)),
+            limited=limiters_of(reduce(or_, (flags for _, flags, _ in acted), 0)),
             after_s=self.periods * self.period_s,
             work=self.drive.work,
         )

@@ -106,6 +106,12 @@ def remembered(site: Path) -> Memory | None:
 
 def check_memory(site: Path, now: Memory, state: Path) -> None:
     """Refuse a history that knows less than its site: what is missing, how to go on."""
+    old = state / "history.sqlite"
+    if not now.nights and old.exists():
+        raise HistoryLost(
+            f"{old}: is the history of an earlier version, which this one does not read: go on with that"
+            " version, or begin anew on purpose with --accept-lost-history"
+        )
     before = remembered(site)
     if before is None:
         return

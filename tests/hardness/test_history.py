@@ -112,6 +112,15 @@ def test_the_command_exits_1_with_one_line(tmp_path, cli, monkeypatch) -> None:
     assert "7 night(s) and 1 approval(s)" in ran.err
 
 
+def test_the_history_of_an_earlier_version_is_refused_and_left(site) -> None:
+    earlier = (state(site) / INDEX).rename(state(site) / "history.sqlite")
+    for begin in (lambda: night(site, 3.0), lambda: approved(site)):
+        with pytest.raises(HistoryLost, match=r"earlier version.*--accept-lost-history"):
+            begin()
+    night(site, 3.0, AGAIN)
+    assert earlier.is_file()
+
+
 def test_any_damage_is_told_or_harmless(site) -> None:
     """Bytes are overwritten, cut off and inserted: every text and number is held by a checksum."""
     paths = [state(site) / INDEX, *sorted((state(site) / "nights").iterdir())]
