@@ -16,7 +16,7 @@ from actuator_lti.errors import InputError, NumericalError
 from actuator_lti.types import Floats
 from analyses.duty.asked import Asked
 from analyses.failures.cases import jammed
-from analyses.motion.settling import pole_sizes
+from analyses.motion.settling import settling_ticks_of
 from analyses.specification.requirements import RequirementVerdict, judged_by, tally
 from nonlinear import commands, simulate
 from nonlinear.runs.running import Piece
@@ -119,7 +119,6 @@ STEADY = 1e-4  # of the rms current: it differs by less, in no printed digit, af
 HOLD_S = 1.0
 MOST_TICKS = 2_000_000
 MOST_WAITED = 10 * MOST_TICKS  # some seconds
-AT_REST = 1e-9  # a pole this near to 1 is one of what nothing moves
 MOST_CYCLES = 2**40
 _DRAWN = 200
 
@@ -190,9 +189,8 @@ def _moving(design: Design, asked: Asked) -> tuple[Piece, int, bool]:
     command = sine if asked.ramp_s == 0.0 else _trapezoid(asked, size, np.arange(0, taken, every), Ts, ticks)
     drive = simulate(design, command, taken * Ts, asked.load_Nm).running
     assert drive is not None
-    sizes, gone, before = pole_sizes(design), 0, inf
-    slowest = float(sizes[sizes < 1.0 - AT_REST].max(initial=0.0))
-    wait = max(PERIODS * ticks, ceil(log(STEADY) / log(slowest)) if slowest > 0.0 else 0)
+    gone, before, settling = 0, inf, settling_ticks_of(design, STEADY)
+    wait = max(PERIODS * ticks, ceil(settling) if settling < inf else 0)
     while True:
         while gone < min(wait, MOST_WAITED):
             piece, gone = drive.advance(taken), gone + taken
