@@ -17,7 +17,7 @@ from actuator_lti.errors import InputError, NumericalError
 from actuator_lti.types import Floats
 from analyses.duty.asked import Asked
 from analyses.failures.cases import jammed
-from analyses.motion.settling import pole_sizes
+from analyses.motion.settling import settling_ticks_of
 from analyses.specification.requirements import RequirementVerdict, judged_by, tally
 from nonlinear import commands, simulate
 from nonlinear.runs.running import Piece
@@ -119,7 +119,6 @@ PERIODS, MANY = 3, 32  # of the motion that pass at least before one is taken; t
 STEADY = 1e-4  # of the rms current: it differs by less, in no printed digit, after twice as many periods
 MOST_TICKS = 2_000_000
 MOST_WAITED = 10 * MOST_TICKS  # some seconds
-AT_REST = 1e-9  # a pole this near to 1 is one of what nothing moves
 MOST_CYCLES = 2**40
 _DRAWN = 200
 
@@ -188,9 +187,8 @@ def _cycle(design: Design, asked: Asked) -> tuple[Piece, Piece | None, bool]:
         command = _trapezoid(asked, size, np.arange(0, taken, every), Ts, taken / periods)
     drive = simulate(design, command, taken * Ts, asked.load_Nm).running
     assert drive is not None
-    sizes, gone, before = pole_sizes(design), 0, inf
-    slowest = float(sizes[sizes < 1.0 - AT_REST].max(initial=0.0))
-    wait = max(PERIODS * taken // periods, ceil(log(STEADY) / log(slowest)) if slowest > 0.0 else 0)
+    gone, before, settling = 0, inf, settling_ticks_of(design, STEADY)
+    wait = max(PERIODS * taken // periods, ceil(settling) if settling < inf else 0)
     while True:
         while gone < min(wait, MOST_WAITED):
             piece, gone = _went_well(drive.advance(taken)), gone + taken
