@@ -17,19 +17,20 @@ import numpy as np
 import numpy.typing as npt
 
 from actuator_lti.design.model import Design
-from actuator_lti.drive.facts import passed_moment_Nm
+from actuator_lti.drive.facts import passed_moment_Nm, stall_torque_Nm
 from actuator_lti.drive.operating import Operating, holding_moment_Nm, level, rubs
 from actuator_lti.drive.profile import command_mean
 from actuator_lti.drive.wiring import wire
 from actuator_lti.errors import InputError
 from actuator_lti.loops.sampled import reference_to_output
+from actuator_lti.systems.settling import settling_ticks, slowest_mode
 from actuator_lti.types import Compared, Complexes, Floats
 from analyses.large_signal.classify import limiter_fractions
-from analyses.large_signal.tones import TANH_TOLERANCE, full_range, settling_ticks_of, tone
+from analyses.large_signal.tones import FAINT, TANH_TOLERANCE, full_range, tone
 from analyses.linear.responses import response_at
 from analyses.validation.places import Bench
 from nonlinear import LIMITERS, Rows
-from nonlinear.bench.operating_motion import OperatingMotion, full_torque_Nm
+from nonlinear.bench.operating_motion import OperatingMotion
 
 NO_MOTION = 1e-3  # of the command
 UPDATES = 400  # of the position loop in a window
@@ -192,7 +193,8 @@ class _Release:
             setup = replace(setup, design=level(held))
         self.setup = replace(setup, bias=still, limits_on=True, held=False)
         tick_s = design.controller.period_s
-        settling = min(settling_ticks_of(closed, self.setup.hold_ticks, design.name), MOST_SETTLING)
+        settling = settling_ticks(slowest_mode([closed.A]), FAINT) * self.setup.hold_ticks
+        settling = ceil(min(settling, MOST_SETTLING))
         travel, cycle = ceil(1.3 * _travel_s(design, name, part) / tick_s), 1.0 / (hertz * tick_s)
         whole = travel + max(ceil(CYCLES * cycle), settling) + 2 * ceil(CYCLES * cycle)
         self.coarser = kind == "delay" and VALUES * whole > MOST_TICKS
@@ -227,7 +229,7 @@ def _travel_s(design: Design, stage: str, part: float) -> float:
     if stage == "current":
         return 0.0
     sizes = full_range(design)
-    speeding = design.inertia_kgm2 * sizes["velocity"] / full_torque_Nm(design)
+    speeding = design.inertia_kgm2 * sizes["velocity"] / stall_torque_Nm(design)
     if stage == "velocity":
         return part * speeding
     return part * sizes["position"] * design.total_ratio / sizes["velocity"] + 2.0 * speeding
