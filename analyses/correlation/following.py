@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.signal import lfilter
 
+from actuator_lti.design.control import FEED_FORWARD
 from actuator_lti.design.model import Design
 from actuator_lti.types import Floats
 from analyses.correlation.driving import Driven, command_of
@@ -27,7 +28,7 @@ class Followed:
     off: float = 0.0  # of what the position has too much of the motion
     limit: str = ""  # the largest current, where the loops take far more of it for the same command
     place: str = ""  # the signal that it is of
-    lags: bool = True  # the simulated following error is that of the speed, whatever the drive's torque
+    lags: bool = True  # the simulated following error makes its speed, whatever the drive's torque
     zero: float = 0.0  # of the place from that of its command, rad (m), where that is most of what is off
 
     @property
@@ -92,8 +93,10 @@ def followed(
     _, alike = ratio_of(own - own.mean(), model - model.mean())
     clock, *off = np.where(np.abs(shares) > SURE * errors, shares, 0.0).tolist()
     limit, lags = _limit(record.signals, simulated), True
-    if (error := _following_error(driven, place, model)) is not None:
-        lags = ratio_of(error - error.mean(), np.gradient(model))[1] >= ALIKE
+    position, error = control.position, _following_error(driven, place, model)
+    if error is not None and position is not None and any(getattr(position, name) for name in FEED_FORWARD):
+        fed = position.feedforward * np.gradient(error + model)
+        lags = ratio_of(error - error.mean(), np.gradient(model) - fed)[1] >= ALIKE
     return Followed(driven.stage, alike, clock, sum(off), limit, place, lags)
 
 
@@ -141,5 +144,5 @@ def following_finding(design: Design, one: Followed) -> Finding:
     if not one.fails:
         largest = 100.0 * max(abs(one.clock), abs(one.off))
         return Finding(subject, True, f"within {largest:.2g} %" if largest else "they agree but for chance")
-    proof = one.lags and loop is not None and loop.integral_time_s is not None
+    proof = (one.lags or one.limit) and loop is not None and loop.integral_time_s is not None
     return Finding(subject, False if proof else None, one.words)
