@@ -22,7 +22,7 @@ from actuator_lti.errors import InputError, finite_number
 from actuator_lti.loops.result import Loops
 from actuator_lti.loops.tick import Block, TickProgram, mean_response, siso, used
 from actuator_lti.systems.resolvent import balanced
-from actuator_lti.systems.rest_mode import System, without_common_rest_mode
+from actuator_lti.systems.rest_mode import System, without_rest_modes
 
 GAINS = np.geomspace(1.0, 1e4, 401)
 _AT_ONCE = 50
@@ -80,7 +80,7 @@ def shown(blocks: Sequence[Block]) -> list[Block]:
     """The blocks of one design without the modes at rest that no update shows, or drives (`rest_mode`)."""
     if len(blocks) == 1:
         return list(blocks)
-    systems, kept = _without_rest([(one.A, one.B, one.C) for one in blocks])
+    systems, kept = without_rest_modes([(one.A, one.B, one.C) for one in blocks])
     names = tuple(np.array(blocks[0].states)[kept])
     return [Block(*each, one.D, names) for each, one in zip(systems, blocks, strict=True)]
 
@@ -188,7 +188,7 @@ def _parts(blocks: Sequence[Block]) -> tuple[list[System], list[System]]:
     of a rounding only.
     """
     moved, others = _split(blocks)
-    return _without_rest(moved)[0], _without_rest(others)[0]
+    return without_rest_modes(moved)[0], without_rest_modes(others)[0]
 
 
 def _split(blocks: Sequence[Block]) -> tuple[list[System], list[System]]:
@@ -199,20 +199,6 @@ def _split(blocks: Sequence[Block]) -> tuple[list[System], list[System]]:
         for part in (inside, ~inside)
     )
     return moved, [(a, np.zeros_like(b), np.zeros_like(c)) for a, b, c in others]
-
-
-def _without_rest(systems: list[System]) -> tuple[list[System], np.ndarray]:
-    """Without the modes at rest that no tick shows, or moves: no gain moves them either (`rest_mode`).
-
-    A velocity controller's integral under a load that is a spring is one. And which states are kept.
-    """
-    left = np.arange(len(systems[0][0]))
-    while left.size:
-        systems, kept = without_common_rest_mode(systems, 1.0, alone=True)
-        if kept.all():
-            break
-        left = left[kept]
-    return systems, left
 
 
 def first_border(excess: Callable[[Any], Any], grid: np.ndarray, none: float, at_once: int = 1) -> float:
@@ -292,7 +278,7 @@ def _delay_border(wired: Drive, longest_ticks: float, now: PeriodicLoop) -> floa
     @cache
     def part(ticks: float) -> PeriodicLoop:
         later, _ = _split(point_blocks(wired.later(ticks * Ts), "u"))
-        left = _without_rest(later)[0] if resting else later
+        left = without_rest_modes(later)[0] if resting else later
         taken = _states(later) - _states(left)
         return PeriodicLoop(left, Ts, now.hidden + resting - taken)
 

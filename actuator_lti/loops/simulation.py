@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -11,6 +12,7 @@ import numpy as np
 from actuator_lti.drive.wiring import COMMANDS
 from actuator_lti.errors import InputError
 from actuator_lti.loops.tick import TickProgram
+from actuator_lti.systems.settling import slowest_mode
 
 if TYPE_CHECKING:
     import control
@@ -41,6 +43,11 @@ class TickSystem:
     @property
     def states(self) -> tuple[str, ...]:
         return self.program.states
+
+    @cached_property
+    def slowest(self) -> float:
+        """Magnitude, per tick, of the mode that decays last or grows; see `slowest_mode`."""
+        return slowest_mode([self.matrices(phase)[0] for phase in range(self.ticks)])
 
     def matrices(self, phase: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """A, B, C, D of tick ``phase`` (inputs: ref, T, M)."""

@@ -20,6 +20,7 @@ import numpy.typing as npt
 from actuator_lti.drive.operating import Operating, OperatingPoint, reaction
 from actuator_lti.drive.wiring import wire
 from actuator_lti.loops.tick import Block, TickProgram, mean_response, pruned, siso
+from actuator_lti.systems.settling import slowest_mode
 
 if TYPE_CHECKING:
     from actuator_lti.design.model import Design
@@ -168,9 +169,9 @@ class Compliance:
         return np.asarray(result[..., 0] if np.ndim(z) == 0 else result)
 
     @property
-    def slowest(self) -> Any:
-        """Largest magnitude of a pole, per tick."""
-        return np.abs(self._poles).max(axis=-1) ** (1.0 / len(self.blocks)) if self.moves else 0.0
+    def slowest(self) -> float:
+        """Magnitude, per tick, of the mode of one design that decays last or grows; see `slowest_mode`."""
+        return slowest_mode([block.A for block in self.blocks])
 
     @property
     def natural_hz(self) -> npt.NDArray[np.float64]:

@@ -55,6 +55,20 @@ def without_common_rest_mode(
     return list(systems), np.ones(len(systems[0][0]), dtype=bool)
 
 
+def without_rest_modes(systems: list[System]) -> tuple[list[System], np.ndarray]:
+    """Sampled systems without the modes at rest that no tick shows, or moves: no gain moves them either.
+
+    A velocity controller's integral under a load that is a spring is one. And which states are kept.
+    """
+    left = np.arange(len(systems[0][0]))
+    while left.size:
+        systems, kept = without_common_rest_mode(systems, 1.0, alone=True)
+        if kept.all():
+            break
+        left = left[kept]
+    return systems, left
+
+
 def _own(systems: Sequence[System], at: float, alone: bool) -> tuple[int, np.ndarray] | None:
     """A mode at rest over the state that is the largest part of it, a row a tick; ``None`` if none.
 

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from math import ceil, inf, log
+from math import ceil, inf
 
 import numpy as np
 
@@ -14,7 +14,7 @@ from actuator_lti.errors import InputError, NumericalError, UnstableError
 from actuator_lti.types import Floats
 from analyses.failures.asked import Asked
 from analyses.failures.cases import Case, Rig, cases_of
-from analyses.motion.settling import Settling, counted, outcome, pole_sizes, settle
+from analyses.motion.settling import Settling, counted, outcome, settle, settling_ticks_of
 from analyses.specification.capability import drive_figures
 from analyses.specification.requirements import RequirementVerdict, judged_by, tally
 from nonlinear.runs.trajectory import ADVICE
@@ -158,15 +158,14 @@ def _hold(rig: Rig, start: float, wait: int, most: int, swing: float) -> None:
 
 def _settling_s(design: Design, asked: Asked) -> float:
     """Time to reach half the stop, or the speed before, and settle."""
-    slowest, period = float(pole_sizes(design).max()), design.controller.period_s
-    if slowest > 1.0 + 1e-9:
+    ticks, period = settling_ticks_of(design, SETTLED), design.controller.period_s
+    if ticks == inf:
         raise UnstableError("failures: the closed loop is not stable")
     figures = drive_figures(design)
     rate, way = min(figures.output_rate_rad_s, design.command.rate_rad_s), 0.5 * asked.stop_rad
     if design.controller.position is None:
         rate, way = figures.acceleration_rad_s2, asked.speed_rad_s
     travel = way / rate if rate > 0.0 else LONGEST_S
-    ticks = log(SETTLED) / log(slowest) if 0.0 < slowest < 1.0 else 0.0
     return min(0.1 + travel + ticks * period, MOST_TICKS * period)
 
 

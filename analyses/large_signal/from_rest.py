@@ -23,9 +23,10 @@ from actuator_lti.drive.profile import command_mean
 from actuator_lti.drive.wiring import wire
 from actuator_lti.errors import InputError
 from actuator_lti.loops.sampled import reference_to_output
+from actuator_lti.systems.settling import settling_ticks, slowest_mode
 from actuator_lti.types import Compared, Complexes, Floats
 from analyses.large_signal.classify import limiter_fractions
-from analyses.large_signal.tones import TANH_TOLERANCE, full_range, settling_ticks_of, tone
+from analyses.large_signal.tones import FAINT, TANH_TOLERANCE, full_range, tone
 from analyses.linear.responses import response_at
 from analyses.validation.places import Bench
 from nonlinear import LIMITERS, Rows
@@ -192,7 +193,8 @@ class _Release:
             setup = replace(setup, design=level(held))
         self.setup = replace(setup, bias=still, limits_on=True, held=False)
         tick_s = design.controller.period_s
-        settling = min(settling_ticks_of(closed, self.setup.hold_ticks, design.name), MOST_SETTLING)
+        settling = settling_ticks(slowest_mode([closed.A]), FAINT) * self.setup.hold_ticks
+        settling = ceil(min(settling, MOST_SETTLING))
         travel, cycle = ceil(1.3 * _travel_s(design, name, part) / tick_s), 1.0 / (hertz * tick_s)
         whole = travel + max(ceil(CYCLES * cycle), settling) + 2 * ceil(CYCLES * cycle)
         self.coarser = kind == "delay" and VALUES * whole > MOST_TICKS

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from math import ceil, log
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -19,7 +18,7 @@ from actuator_lti.loops.limiters import onset
 from analyses.large_signal.classify import limiter_fractions
 from analyses.large_signal.map import COUNTS, AmplitudeBode, AmplitudeMap, amplitude_bode, amplitude_map
 from analyses.large_signal.sawtooth import Sawtooth, sawtooth
-from analyses.large_signal.tones import DECAY, MOST_TICKS, linear_steady_state, run_tones, tones, work_ticks
+from analyses.large_signal.tones import MOST_TICKS, linear_steady_state, run_tones, tones, work_ticks
 from analyses.linear.responses import response_at
 from nonlinear import LIMITERS
 
@@ -28,7 +27,7 @@ if TYPE_CHECKING:
 
 COUNT, LEAST, ROUNDS = 12, 3, 9
 TRIED = (0.3, 3.0)  # times the linear limit
-SETTLED = 1e4  # what begins at rest is that much smaller by the window: a limit is closed in to 0.5 %
+SETTLED = 1e-4  # of what begins at rest is left by the window: a limit is closed in to 0.5 %
 
 
 @dataclass(frozen=True)
@@ -64,8 +63,7 @@ def limit_shift(design: Design, loops: Loops, count: int = COUNT) -> LimitShift 
     within = min(count, max(int(count * MOST_TICKS / work), LEAST))
     chosen = tones(design, loops, within)
     omega = np.array([t.omega_rad_s for t in chosen])
-    border, start = onset(loops, omega), linear_steady_state(loops, omega)
-    brief = replace(start, settling_ticks=ceil(start.settling_ticks * log(SETTLED) / DECAY))
+    border, start = onset(loops, omega), linear_steady_state(loops, omega, SETTLED)
     there = np.isfinite(border.amplitude_rad)
     limited, linear = np.flatnonzero(there), border.amplitude_rad[there]
     if not (start.stable and limited.size):
@@ -73,7 +71,7 @@ def limit_shift(design: Design, loops: Loops, count: int = COUNT) -> LimitShift 
 
     def acting(amplitude: np.ndarray) -> np.ndarray:
         begin = np.minimum(amplitude, 0.99 * linear)
-        return limiter_fractions(run_tones(design, chosen, limited, amplitude, brief, begin, harmonics=1))
+        return limiter_fractions(run_tones(design, chosen, limited, amplitude, start, begin, harmonics=1))
 
     simulated, names = np.full(len(omega), np.nan), np.full(len(omega), "", dtype=object)
     simulated[limited], names[limited] = _bisect(acting, linear, [border.active[k] for k in limited])

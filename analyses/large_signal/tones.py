@@ -4,7 +4,6 @@ import math
 import re
 from collections.abc import Collection, Iterable
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -17,6 +16,7 @@ from actuator_lti.errors import InputError, NumericalError
 from actuator_lti.loops import Loops
 from actuator_lti.loops.tick import mean_response
 from actuator_lti.systems.resolvent import states_at
+from actuator_lti.systems.settling import settling_ticks
 from analyses.large_signal.classify import FULL_TRIANGLE, STEADY
 from analyses.linear.responses import response_at
 from nonlinear import Rows
@@ -52,7 +52,7 @@ LEFT_AT_REST = (
     r"hold_\w+|\w+_prev|(?:current|velocity)\.x\d+",
 )
 """States that a run begins at rest: rows have no word for them; the settling time counts their decay."""
-DECAY = math.log(1e9)  # what begins at rest is gone by then, so that small sines are the linear ones
+LEFT = 1e-9  # what begins at rest is gone by then, so that small sines are the linear ones
 LONGEST_PERIODS = 20_000
 
 
@@ -63,11 +63,11 @@ class LinearSteadyState:
     output: np.ndarray  # shape (K,): command to output angle, fundamental over all ticks, mean included
     states: dict[str, np.ndarray]  # shape (K,): by column of the rows: value at t = 0 is the imaginary part
     stable: bool
-    settling_ticks: int  # ticks in which the slowest mode falls to 1e-9
+    settling_ticks: int  # ticks in which the slowest mode falls to what is left; cut at `LONGEST_PERIODS`
 
 
-def linear_steady_state(loops: Loops, omega_rad_s: np.ndarray) -> LinearSteadyState:
-    """Solve the sampled loop for its periodic state at each frequency."""
+def linear_steady_state(loops: Loops, omega_rad_s: np.ndarray, left: float = LEFT) -> LinearSteadyState:
+    """Solve the sampled loop for its periodic state at each frequency; settled, so much is ``left``."""
     system = loops.tick_system
     assert system is not None
     if unknown := without_value(system.states, PLACES.keys(), LEFT_AT_REST):
@@ -87,16 +87,14 @@ def linear_steady_state(loops: Loops, omega_rad_s: np.ndarray) -> LinearSteadySt
     if "w_ref" in system.outputs:
         row, (_, _, C, D) = system.outputs.index("w_ref"), system.matrices(0)
         states["speed_command_start"] = (x @ C[row] + D[row, 0]) / z
-    radius = float(np.max(np.abs(np.linalg.eigvals(A))))
-    periods = 1 if radius < 1.0 else 500
-    if 0.0 < radius < 1.0:
-        periods = min(math.ceil(-DECAY / math.log(radius)), LONGEST_PERIODS)
+    settling = settling_ticks(system.slowest, left)
+    periods = min(math.ceil(settling / M), LONGEST_PERIODS) if settling < math.inf else 500
     mean = command_mean(loops.design)
     if mean is not None:  # in front of the loop: all that follows it is that much smaller and later
         before_loop = mean.response(omega_rad_s)
         output, states = output * before_loop, {name: x * before_loop for name, x in states.items()}
         periods += math.ceil(mean.samples * loops.design.controller.position_loop.every / M)
-    return LinearSteadyState(output, states, radius < 1.0, periods * M)
+    return LinearSteadyState(output, states, settling < math.inf, periods * M)
 
 
 def triangle_start(design: Design, rows: Rows, amplitude_rad: np.ndarray, limited: np.ndarray) -> None:
@@ -233,19 +231,20 @@ def run_tones(
     return result.with_part(late, longer.run(drives=[drives[int(k)] for k in late]))
 
 
-TIME_CONSTANTS = 14.0  # of the slowest pole
+FAINT = 1e-6  # of what begins at rest is left, unless said otherwise
 LONGEST_TICKS = 400_000
 
 
-def settling_ticks_of(closed_loop: Any, hold_ticks: int, where: str) -> int:
-    """Ticks after which the slowest pole of a sampled closed loop is forgotten."""
-    size = np.abs(closed_loop.poles())
-    if (size > 1.0 + 1e-9).any():
-        raise InputError("the loop is not stable: nothing settles in it", where=where)
-    slowest = size[size < 1.0 - 1e-9].max(initial=0.0)
-    if slowest <= 0.0:
-        return 20 * hold_ticks
-    return int(min(math.ceil(TIME_CONSTANTS / -math.log(slowest) + 20.0) * hold_ticks, LONGEST_TICKS))
+def settled_ticks(loops: Loops, left: float = FAINT) -> int:
+    """Whole ticks after which so much is ``left`` of the slowest mode of sampled loops, cut at the longest.
+
+    Raises `InputError`: where they are not stable.
+    """
+    assert loops.tick_system is not None
+    ticks = settling_ticks(loops.tick_system.slowest, left)
+    if ticks == math.inf:
+        raise InputError("the loop is not stable: nothing settles in it", where=loops.design.name)
+    return math.ceil(min(ticks, LONGEST_TICKS))
 
 
 def full_range(design: Design) -> dict[str, float]:

@@ -9,14 +9,14 @@ fundamental ``n(A/q, d) A`` with
 
 from dataclasses import dataclass
 from functools import cache
-from math import inf, log, pi
+from math import inf, pi
 
 import numpy as np
 
 from actuator_lti.design.model import Design, Sensor
 from actuator_lti.loops import Loops
 from actuator_lti.types import Floats
-from analyses.large_signal.tones import TIME_CONSTANTS, full_range, tone
+from analyses.large_signal.tones import full_range, settled_ticks, tone
 from analyses.limit_cycles import describing
 from analyses.limit_cycles.run import Confirmation, confirm
 from analyses.linear.loop_figures import loop_figures
@@ -31,7 +31,7 @@ SPEEDS = (0.05, 0.382, 1.382, 5.1)  # counts a sample: few, and so that no patte
 PART = 0.3  # of the drive's speed: no faster is looked at
 SAMPLES = 2000  # of a window at constant speed
 UPDATES = 400  # of the position loop in a window of a sine
-SETTLED = 1e4  # what begins at rest is that much smaller by then: far below `WITHIN`
+SETTLED = 1e-4  # of what begins at rest is left by then: far below `WITHIN`
 TRIED = np.array([0.1, 0.3, 1.0, 2.0, 4.0, 16.0, 64.0, 256.0])  # of the amplitude from which it is linear
 
 
@@ -73,21 +73,21 @@ def linear_ratio() -> float:
     return ratio
 
 
-def counts_of(design: Design, loops: Loops, settle_ticks: int) -> tuple[Counts, ...]:
-    """Look at every encoder whose counts a loop sees, of a position drive that settles in so many ticks."""
+def counts_of(design: Design, loops: Loops) -> tuple[Counts, ...]:
+    """Look at every encoder whose counts a loop sees, of a position drive of these sampled, sliding loops."""
     causes = (cause for cause in reversed(describing.SENSORS) if describing.counts_matter(design, cause))
-    return tuple(_counts(design, loops, cause, settle_ticks) for cause in causes)
+    return tuple(_counts(design, loops, cause) for cause in causes)
 
 
-def _counts(design: Design, loops: Loops, cause: describing.Cause, settle_ticks: int) -> Counts:
+def _counts(design: Design, loops: Loops, cause: describing.Cause) -> Counts:
     sensor, other = describing.SENSORS[cause]
     quantum, velocity = describing.quantum_of(design, cause) or 0.0, design.controller.velocity
     to_motor = design.total_ratio if sensor == "output" else 1.0
     to_output = design.total_ratio if sensor == "motor" else 1.0
     alone, ideal = without_counts(design, other), without_counts(design)
-    ripple, at = _ripple(alone, ideal, quantum * to_motor, settle_ticks)
+    ripple, at = _ripple(alone, ideal, quantum * to_motor, settled_ticks(loops))
     linear = linear_ratio() * quantum
-    off = _linearity(alone, ideal, loops, linear / to_output, settle_ticks)
+    off = _linearity(alone, ideal, loops, linear / to_output)
     good = np.logical_and.accumulate((off <= WITHIN)[::-1])[::-1]  # here and at all that is larger
     made_of = velocity is not None and velocity.sensor == sensor and design.encoder.speed == "difference"
     step = min(design.validation.amplitude_fractions) * design.validation.full_deflection_rad
@@ -133,7 +133,7 @@ def _ripple(design: Design, ideal: Design, count_rad: float, settle_ticks: int) 
     return max(float(added[k]), 0.0), float(speeds[k])
 
 
-def _linearity(design: Design, ideal: Design, loops: Loops, output_rad: float, settle_ticks: int) -> Floats:
+def _linearity(design: Design, ideal: Design, loops: Loops, output_rad: float) -> Floats:
     """What the response to the command is off by with counts, at `TRIED` times an amplitude of the output."""
     band = loop_figures(loops.present["position"], loops.plain_response).bandwidth
     if band is None or band.minus3db_hz is None:
@@ -144,7 +144,7 @@ def _linearity(design: Design, ideal: Design, loops: Loops, output_rad: float, s
     for one in (design, ideal):  # nothing else that is not linear: no play, no friction
         rows = Rows.of(describing.without_nonlinearities(one), TRIED.size, friction_on=False, limits_on=False)
         rows.sine("command", output_rad / gain * TRIED, sine.frequency_hz)
-        rows["ticks"] = np.ceil(settle_ticks * log(SETTLED) / TIME_CONSTANTS) + sine.ticks
+        rows["ticks"] = settled_ticks(loops, SETTLED) + sine.ticks
         rows.window(sine.ticks, sine.cycles)
         run = rows.run()
         seen.append(run.phasor("output_angle_rad"))

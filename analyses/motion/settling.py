@@ -12,10 +12,11 @@ from actuator_lti.asked.verdict import Verdict
 from actuator_lti.design.checks import CHECKS
 from actuator_lti.design.model import Design, Requirement, Waiver
 from actuator_lti.drive.operating import straight
+from actuator_lti.drive.wiring import wire
 from actuator_lti.files.reading import Tree
-from actuator_lti.loops import Loops, assemble_loops
-from actuator_lti.loops.stiffness import compliance
-from actuator_lti.types import Floats
+from actuator_lti.loops import Loops
+from actuator_lti.loops.sampled import tick_system
+from actuator_lti.systems.settling import settling_ticks
 from analyses.large_signal.tones import TANH_TOLERANCE, full_command
 from analyses.limit_cycles.stick_slip import stick_slip_cycle
 from nonlinear.rows import Rows
@@ -53,16 +54,13 @@ class Settling:
         return known.get(self.rest.verdict, self.swing_rad)
 
 
-def pole_sizes(design: Design) -> Floats:
-    """Magnitudes, per tick, of the poles by which the command and a load are followed.
+def settling_ticks_of(design: Design, left: float) -> float:
+    """Ticks after which so much is ``left`` of the linear drive's slowest mode; inf: it is not stable.
 
-    A load torque that does not reach the motor shows none of the poles by which the command is followed; what
-    passes as a drive turns makes none unstable.
+    What passes as a drive without a position loop turns makes none unstable.
     """
     there = design if design.controller.position is not None else straight(design)
-    followed, period = assemble_loops(there).plain_response, design.controller.period_s
-    updates = [] if followed is None else np.abs(followed.poles()) ** (period / followed.dt)
-    return np.append(updates, float(compliance(there).slowest))
+    return settling_ticks(tick_system(wire(there)).slowest, left)
 
 
 def counted(rest: Rest, least: float) -> Rest:

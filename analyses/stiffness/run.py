@@ -148,7 +148,7 @@ def _checked(bench: Design, way: OperatingPoint, hertz: npt.NDArray[np.float64])
     motion = creeping(bench, driven=way == "driven") if moving else standing(bench)
     at = replace(motion.operating(bench), point=way, speed_rad_s=0.0, angle_rad=motion.output_rad(bench))
     response = linear.compliance(bench, at)
-    if float(response.slowest) >= 1.0:
+    if response.slowest > 1.0:
         at_load = "" if way == "sliding" else f", friction by load {way}"
         raise UnstableError(f"stiffness: the closed loop is not stable{at_load}")
     if not response.moves:

@@ -21,7 +21,7 @@ from analyses.isolation import attempt
 from analyses.large_signal.conditional import conditional_stability
 from analyses.large_signal.from_rest import RestSweep, margins_by_amplitude, sweep_from_rest
 from analyses.large_signal.result import large_signals
-from analyses.large_signal.tones import settling_ticks_of
+from analyses.large_signal.tones import settled_ticks
 from analyses.limit_cycles.counts import counts_of
 from analyses.linear.loop_figures import all_loop_figures, loop_figures
 from analyses.motion.settling import settlings_of
@@ -114,7 +114,7 @@ class _Work:
             settlings=settled,
             rest_sweep=self._asked("motion from rest", whole, self._rest, None),
             counts=self._asked("motion from rest", whole,
-                lambda: counts_of(design, bench.commanded, self._settle()), ()),
+                lambda: counts_of(design, bench.commanded), ()),
             large_signals=self._asked("large signals", whole,
                 lambda: large_signals(design, self._whole, counts=settings.map_counts), None),
             friction=self._asked("friction effects", whole,
@@ -194,11 +194,6 @@ class _Work:
         at = self.bench.setup("command").bias.operating(self.bench.drive)
         return loops_at(replace(self.bench.linear, command=self.bench.model.command), at)
 
-    def _settle(self) -> int:
-        """Ticks in which the position loop settles."""
-        closed = self.bench.commanded.present["position"].plain_closed
-        return settling_ticks_of(closed, self.bench.setup("position").hold_ticks, self.design.name)
-
     def _rest(self) -> RestSweep | None:
         """Sines from rest, about the bandwidth of the response to the command, feed-forward included."""
         design, mean = self.design, command_mean(self.bench.model)
@@ -213,7 +208,9 @@ class _Work:
         asked = np.sort(np.concatenate([asked, near[near < top]]))
         part = min(design.validation.amplitude_fractions) * design.validation.full_deflection_rad
         limited = onset(self._whole, 2.0 * np.pi * asked).amplitude_rad
-        return sweep_from_rest(design, asked, np.minimum(part, 0.5 * limited), self._settle())
+        return sweep_from_rest(
+            design, asked, np.minimum(part, 0.5 * limited), settled_ticks(self.bench.commanded)
+        )
 
 
 def _unproven(name: str, notes: list[str]) -> Row:
