@@ -202,7 +202,7 @@ def test_a_slow_recorder_tells_the_clock_too(later: float) -> None:
 
 @pytest.mark.parametrize(("ramp", "load_ramp"), [(0.01, 0.05), (0.01, 0.2), (0.03, 0.05), (0.03, 0.2)])
 def test_edges_of_two_shapes_are_centred_on_each_other(ramp: float, load_ramp: float) -> None:
-    """The same edge up and down: by symmetry the middles coincide. The fit went to and fro, 1.2 ms beside it."""
+    """The same edge up and down: by symmetry the middles coincide. Was up to 1.2 ms beside it."""
 
     def edges(time: np.ndarray, over: float) -> np.ndarray:
         return np.clip((time - 2.0) / over, 0.0, 1.0) - np.clip((time - 16.0) / over, 0.0, 1.0)
