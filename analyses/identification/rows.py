@@ -87,7 +87,7 @@ def drive_of(design: Design, record: Record) -> tuple[Floats, str, str, bool]:
         if name in signals and constant is not None and ohm is not None:
             told = f"kM (u - kE w)/R of the {words}, without the inductance"
             return np.asarray(constant / ohm * record[name]), name, told, True
-    told = "no drive signal: force, current (with kM), torque_reference or voltage (with a source gain, or kM and R)"
+    told = "no drive signal: force, current (kM), torque_reference, or voltage (a source gain, or kM and R)"
     raise lacking(record, told)
 
 

@@ -504,7 +504,7 @@ def _counted(
 
 
 def _load(design: Design, record: Record) -> Finding | None:
-    """A recorded load that goes with the current as its own torque: a load that the drive moves is against it."""
+    """A recorded load that goes with the current as its own torque: what the drive moves is against it."""
     name, constant = LOADS[design.axis], design.effective_motor.torque_constant_Nm_A
     if not {name, "current"} <= record.signals.keys() or not constant or not np.ptp(record[name]):
         return None
@@ -513,8 +513,12 @@ def _load(design: Design, record: Record) -> Finding | None:
         share, alike = ratio_of(load, ratio * torque)
         if alike > ALIKE and abs(share - 1.0) <= SURE * own_share(design, "motor.torque_constant"):
             words = "kM i" if ratio == 1.0 else "kM i and the reduction"
-            told = f"the {name} is {share:.4g} times {words}: the drive's own (leave the column out), or a load "
-            return Finding("load against the current", False, f"{told}of turned sign: positive drives forward")
+            told = (
+                f"the {name} is {share:.4g} times {words}: the drive's own (leave the column out), or a load "
+            )
+            return Finding(
+                "load against the current", False, f"{told}of turned sign: positive drives forward"
+            )
     return None
 
 

@@ -56,7 +56,9 @@ def _use(record: Record, one: InputColumn, used: Mapping[str, str]) -> InputUse:
 def lacking(record: Record, told: str) -> InputError:
     """What a record lacks, and which columns of its file were not read, and why."""
     left = "; ".join(f"{shown(one.column)}: {one.note}" for one in record.inputs if not one.signal)
-    told += f"; of its columns were not read, unless a record file (TOML) says what they are: {left}" * bool(left)
+    told += f"; of its columns were not read, unless a record file (TOML) says what they are: {left}" * bool(
+        left
+    )
     return InputError(told, where=record.name)
 
 

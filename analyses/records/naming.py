@@ -66,9 +66,9 @@ NOT_NEEDED = {"motor_angle": "m", "motor_position": "m"}
 
 SUFFIXES = {
     "rad": "rad", "deg": "deg", "rev": "rev", "turn": "turn", "m": "m", "mm": "mm", "um": "um",
-    "A": "A", "mA": "mA", "Arms": "Arms", "V": "V", "mV": "mV", "N": "N", "kN": "kN", "Nm": "N*m", "mNm": "mN*m",
-    "rad_s": "rad/s", "deg_s": "deg/s", "rpm": "rpm", "krpm": "krpm", "rev_s": "rev/s", "m_s": "m/s", "mm_s": "mm/s",
-    "s": "s", "ms": "ms", "us": "us",
+    "A": "A", "mA": "mA", "Arms": "Arms", "V": "V", "mV": "mV", "N": "N", "kN": "kN", "Nm": "N*m",
+    "mNm": "mN*m", "rad_s": "rad/s", "deg_s": "deg/s", "rpm": "rpm", "krpm": "krpm", "rev_s": "rev/s",
+    "m_s": "m/s", "mm_s": "mm/s", "s": "s", "ms": "ms", "us": "us",
 }  # fmt: skip
 _BRACKETS = re.compile(r"^(?P<base>.*?)\s*[\[({](?P<unit>[^\])}]*)[\])}]\s*$")
 _SLASH = re.compile(r"^(?P<base>[^/]*[^/\s])\s*/\s*(?P<unit>\S.*)$")

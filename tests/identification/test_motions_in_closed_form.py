@@ -204,7 +204,7 @@ def test_noise_behind_a_filter_is_no_motion(corner_hz: float, moves: float) -> N
 
 @pytest.mark.parametrize("place", ["velocity", "position"])
 def test_a_motion_under_a_load_that_is_not_known_is_one(place: str) -> None:
-    """30 times what the drive takes, as gravity or a load of turned sign leave: its torque may be zero then."""
+    """30 times what the drive takes, as gravity or a load of turned sign leave: that may be zero then."""
     time, way, speed, acceleration = _sines(np.random.default_rng(0), 4000)
     own = MASS * acceleration + VISCOUS * speed + DRY * np.sign(speed)
     force = own + 30.0 * np.std(own) * np.sin(0.7 * time)

@@ -22,7 +22,16 @@ from analyses.records.open_record import open_record
 from analyses.records.record import Record, prepared
 from nonlinear import commands, simulate
 from tests.changed import changed
-from tests.identification.bench_records import Columns, bare, columns_of, item_of, motion, record_of, signals_of, write
+from tests.identification.bench_records import (
+    Columns,
+    bare,
+    columns_of,
+    item_of,
+    motion,
+    record_of,
+    signals_of,
+    write,
+)
 from tests.refusals import refused
 
 DRIVE = load_design("ilr33-amber")
@@ -169,7 +178,9 @@ def test_a_following_error_that_torques_make_tells_no_clock() -> None:
     other = {"friction.dry_torque": 1.5 * DRIVE.friction.dry_torque_Nm, "motor.rotor_inertia": 2.5e-6}
     columns = signals_of(motion(2, design=with_values(design, other)), 1)
     record = _record(columns, "reference", "angle", "current")
-    (told,) = (one for one in correlate_record(design, record).findings if one.subject.startswith("following"))
+    (told,) = (
+        one for one in correlate_record(design, record).findings if one.subject.startswith("following")
+    )
     assert told.passed is None
 
 
