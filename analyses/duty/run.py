@@ -222,7 +222,10 @@ def _periods(design: Design, asked: Asked, updates: float) -> tuple[int, int]:
     Those that come nearest to whole updates, as the frequency is then the one that is asked; where a load
     turns with its drive nearest to whole turns.
     """
-    most = min(MANY, max(1, int(MOST_TICKS * asked.frequency_hz * design.controller.period_s) - PERIODS))
+    longest_s = MOST_TICKS * design.controller.period_s
+    most = min(MANY, max(1, int(longest_s * asked.frequency_hz) - PERIODS))
+    if asked.share < 1.0:
+        most = min(most, max(1, int(asked.share * asked.cycle_s * asked.frequency_hz)))
     if not (runs(design) and follows_angle(design) and asked.ramp_s > 0.0 and asked.share == 1.0):
         nearest = Fraction(updates).limit_denominator(most)
         return nearest.denominator, nearest.numerator
