@@ -135,7 +135,7 @@ def test_no_step_is_followed_that_no_requirement_is_on(monkeypatch):
 
 
 def test_all_that_is_asked_of_the_same_designs_is_one_look_at_them():
-    """With a look at each question the search for the joint's trade-off ended at its bound, two points not met."""
+    """With a look at each question the joint's trade-off ended at its bound, two points not met."""
     problem = problem_of(load_design("joint"), load_design("joint").requirements, {})
     gains, corners = np.stack([problem.start, problem.present, problem.start]), problem.all_corners[:4]
     chosen = problem.evaluations  # to choose the factors
