@@ -7,10 +7,9 @@ import numpy as np
 from scipy.optimize import root_scalar
 
 from actuator_lti.design.model import Command, Design
-from actuator_lti.design.plant import torque_per_command
 from actuator_lti.drive.facts import breakaway_torque_Nm, stall_torque_Nm
 from actuator_lti.drive.operating import holding_torque_Nm
-from actuator_lti.drive.steady import motor_torque_Nm, torque_gain_Nm_rad
+from actuator_lti.drive.steady import drive_gain, filtered, motor_torque_Nm, torque_gain_Nm_rad
 from analyses.finite import finite
 from nonlinear import Rows, commands, simulate
 from nonlinear.bench.operating_motion import operating_motion_at
@@ -69,7 +68,7 @@ def static_threshold(design: Design, load_Nm: float = 0.0) -> StaticThreshold:
 
 
 FRACTIONS = (0.2, 0.3, 0.5, 0.7, 0.9)
-WITHIN, COUNT = 0.05, 51
+WITHIN, RESOLUTION = 0.05, 2e-3  # of the threshold: beyond it something has to move, and it is known to
 
 
 @dataclass(frozen=True)
@@ -111,10 +110,14 @@ def threshold(design: Design, load_Nm: float) -> Threshold | None:
         times = zip(sizes.tolist(), _first_motion_s(design, load_Nm, sizes), strict=True)
         waiting = tuple(Waiting(size, static.waiting_time_s(size), finite(time)) for size, time in times)
         return Threshold(static, waiting, None, 0.0)
-    sizes = static.forward_rad * np.linspace(1.0 - WITHIN, 1.0 + WITHIN, COUNT)
-    moved = _first_motion_s(design, load_Nm, sizes) < math.inf
-    first = float(sizes[np.argmax(moved)]) if moved.any() else None
-    return Threshold(static, (), first, 2.0 * WITHIN / (COUNT - 1))
+    low, high = 0.0, (1.0 + WITHIN) * static.forward_rad
+    if _first_motion_s(design, load_Nm, np.array([high]))[0] == math.inf:
+        return Threshold(static, (), None, RESOLUTION)
+    while high - low > RESOLUTION * static.forward_rad:  # a current that overshoots moves it before
+        size = 0.5 * (low + high)
+        moves = _first_motion_s(design, load_Nm, np.array([size]))[0] < math.inf
+        low, high = (low, size) if moves else (size, high)
+    return Threshold(static, (), high, RESOLUTION)
 
 
 def _first_motion_s(design: Design, load_Nm: float, sizes: np.ndarray) -> np.ndarray:
@@ -148,7 +151,8 @@ class Hysteresis:
     command_rad: np.ndarray  # one period at updates of the position loop, thinned
     output_rad: np.ndarray
     width_rad: float  # output falling less output rising, both where the command passes zero
-    linear_width_rad: float  # the same without dry friction and play: what the loop lags by at this rate
+    # The same without dry friction, its feed-forward and play: what the loop lags by at this rate
+    linear_width_rad: float
     largest_rad: float  # distance of the output from that without dry friction and play, at any update
     predicted_rad: float  # what a reversal loses of a slow command: `lost_predicted_rad`
 
@@ -165,10 +169,11 @@ def hysteresis(design: Design, load_Nm: float, static: StaticThreshold, settling
     ticks = 4 * every * round(ticks / (4 * every))
     period = ticks * design.controller.period_s
     smallest = min(design.validation.amplitude_fractions) * design.validation.full_deflection_rad
-    tight, play = design, 0.0
+    unfed, play = replace(design.controller.position_loop, friction_feedforward=0.0), 0.0
+    tight = replace(design, controller=replace(design.controller, position=unfed))
     if design.coupling is not None:
         play = design.coupling.play_rad / design.ratio_behind_coupling
-        tight = replace(design, coupling=replace(design.coupling, play_rad=0.0))
+        tight = replace(tight, coupling=replace(design.coupling, play_rad=0.0))
     amplitude = min(SPAN * (static.forward_rad + play), max(smallest, 2.0 * play))
     command = commands.triangle(amplitude, 1.0 / period)
     widths, outputs, updates = [], [], ticks // every
@@ -199,7 +204,7 @@ def lost_predicted_rad(design: Design, load_Nm: float, static: StaticThreshold, 
 def _lag_rad(design: Design, load_Nm: float, static: StaticThreshold, rate_rad_s: float) -> float:
     """Command less output while the drive slides through zero of the command at a rate."""
     loop, load, sense = design.controller.position_loop, design.load, math.copysign(1.0, rate_rad_s)
-    fed = sense * loop.friction_feedforward * torque_per_command(design) if loop.friction_feedforward else 0.0
+    fed = sense * loop.friction_feedforward * float(drive_gain(design) * filtered(design, "torque"))
 
     def missing(lag: float) -> float:
         moment = load_Nm + float(load.moment_Nm(-lag))
