@@ -2,6 +2,7 @@
 
 from bisect import bisect_left
 from dataclasses import dataclass, replace
+from fractions import Fraction
 from functools import cached_property
 from math import ceil, exp, inf, isfinite, log, pi, sqrt
 
@@ -57,7 +58,7 @@ class Duty:
     continuous_A: float  # what the design allows for ever; inf where it states none
     limited: tuple[str, ...]  # limiters that act in steady motion: the duty is then not followed as asked
     shaft_W: float  # mean over the cycle of what the motor gives its shaft
-    peak_power_W: float  # largest from the supply into the winding, and back: copper and shaft
+    peak_power_W: float  # largest into the motor, and back out of it: copper and shaft
     fed_back_W: float
     time_s: Floats  # one period of the steady motion, or several where the load turns with it
     current_A: Floats
@@ -87,7 +88,7 @@ class Duty:
 
     @property
     def mean_power_W(self) -> float:
-        """Mean over the cycle of what the supply gives the motor: copper and shaft."""
+        """Mean over the cycle of what goes into the motor: copper and shaft."""
         return self.copper_W + self.shaft_W
 
     @cached_property
@@ -116,7 +117,6 @@ class Duty:
 
 PERIODS, MANY = 3, 32  # of the motion that pass at least before one is taken; that are taken at the most
 STEADY = 1e-4  # of the rms current: it differs by less, in no printed digit, after twice as many periods
-HOLD_S = 1.0
 MOST_TICKS = 2_000_000
 MOST_WAITED = 10 * MOST_TICKS  # some seconds
 MOST_CYCLES = 2**40
@@ -144,12 +144,9 @@ def duty(design: AnyDesign, asked: Asked | None = None) -> Duty:
     asked = Asked.of(design) if asked is None else asked
     there = jammed(design) if design.controller.outermost == "current" else design
     free = replace(there, limits=replace(design.limits, peak_time_s=None))
-    piece, ticks, steady = _moving(free, asked)
-    current, speed = piece.signal("current_A").copy(), piece.signal("motor_speed_rad_s")
-    still = np.zeros(1)
-    if asked.share < 1.0:
-        resting = simulate(free, commands.hold(), HOLD_S, asked.load_Nm).current_A
-        still = resting[resting.size // 2 :]
+    piece, rest, steady = _cycle(free, asked)
+    current, speed = (piece.signal(name).copy() for name in ("current_A", "motor_speed_rad_s"))
+    ticks, still = current.size, np.zeros(1) if rest is None else rest.signal("current_A")
     periods, more = divmod(_moving_ticks(asked, design.controller.period_s, ticks), ticks)
 
     def mean(values: Floats) -> float:
@@ -170,11 +167,11 @@ def duty(design: AnyDesign, asked: Asked | None = None) -> Duty:
     )  # fmt: skip
 
 
-def _moving(design: Design, asked: Asked) -> tuple[Piece, int, bool]:
-    """The periods that are taken of the motion, their ticks, and whether it is steady.
+def _cycle(design: Design, asked: Asked) -> tuple[Piece, Piece | None, bool]:
+    """What is taken of the motion, the rest that follows it, and whether the motion is steady.
 
     That is where the slowest pole has fallen to `STEADY` and, with all that is not linear, the rms current is
-    the same after twice as long.
+    the same after twice as long. The rest goes on from there: friction holds what the motion has left.
     """
     Ts, size = design.controller.period_s, asked.size_of(design)
     every = round(design.controller.period_of(design.controller.outermost) / Ts)
@@ -182,39 +179,59 @@ def _moving(design: Design, asked: Asked) -> tuple[Piece, int, bool]:
     if asked.frequency_hz < lowest:
         motion = f"a peak of {size:.4g} (in SI) at {asked.frequency_hz:.4g} Hz"
         raise InputError(f"{motion}: at least {lowest:.4g} Hz with this period")
-    ticks = max(1, round(1.0 / (asked.frequency_hz * Ts * every))) * every
-    taken = _periods(design, asked, max(1, MOST_TICKS // ticks - PERIODS)) * ticks
-    sine = commands.sine(size, 1.0 / (ticks * Ts))
-    check_frequency(design, replace(sine, highest_hz=max(asked.frequency_hz, sine.highest_hz)))
-    command = sine if asked.ramp_s == 0.0 else _trapezoid(asked, size, np.arange(0, taken, every), Ts, ticks)
+    check_frequency(design, commands.sine(size, asked.frequency_hz))
+    periods, updates = _periods(design, asked, 1.0 / (asked.frequency_hz * Ts * every))
+    taken = updates * every
+    command = commands.sine(size, periods / (taken * Ts))
+    if asked.ramp_s > 0.0:
+        command = _trapezoid(asked, size, np.arange(0, taken, every), Ts, taken / periods)
     drive = simulate(design, command, taken * Ts, asked.load_Nm).running
     assert drive is not None
     gone, before, settling = 0, inf, settling_ticks_of(design, STEADY)
-    wait = max(PERIODS * ticks, ceil(settling) if settling < inf else 0)
+    wait = max(PERIODS * taken // periods, ceil(settling) if settling < inf else 0)
     while True:
         while gone < min(wait, MOST_WAITED):
-            piece, gone = drive.advance(taken), gone + taken
-            if piece.status != "ok":
-                raise NumericalError(f"duty ({piece.status}): {ADVICE[piece.status]}")
+            piece, gone = _went_well(drive.advance(taken)), gone + taken
         rms = float(np.sqrt(np.mean(piece.signal("current_A") ** 2)))
         steady = abs(rms - before) <= STEADY * rms
         if steady or wait >= MOST_WAITED:
-            return piece, taken, steady
+            break
         wait, before = 2 * gone, rms
+    if asked.share == 1.0:
+        return piece, None, steady
+    drive.command(0.0)
+    resting = min((1.0 - asked.share) * asked.cycle_s / Ts, float(MOST_TICKS))
+    return piece, _went_well(drive.advance(max(1, round(resting)))), steady
 
 
-def _trapezoid(asked: Asked, size: float, at: Floats, Ts: float, ticks: int) -> commands.Command:
+def _went_well(piece: Piece) -> Piece:
+    if piece.status != "ok":
+        raise NumericalError(f"duty ({piece.status}): {ADVICE[piece.status]}")
+    return piece
+
+
+def _trapezoid(asked: Asked, size: float, at: Floats, Ts: float, ticks: float) -> commands.Command:
     """The command of a trapezoid of so many ticks, sampled at ticks."""
     ends = np.array([0.0, asked.ramp_s / Ts, ticks - asked.ramp_s / Ts, ticks])
     return commands.sampled(at * Ts, np.interp(at % ticks, ends, [0.0, size, size, 0.0]))
 
 
-def _periods(design: Design, asked: Asked, most: int) -> int:
-    """How many are taken: where a load turns with its drive as many as come nearest to whole turns."""
+def _periods(design: Design, asked: Asked, updates: float) -> tuple[int, int]:
+    """How many are taken, of so many updates each, and the updates of them all.
+
+    Those that come nearest to whole updates, as the frequency is then the one that is asked; where a load
+    turns with its drive nearest to whole turns.
+    """
+    longest_s = MOST_TICKS * design.controller.period_s
+    most = min(MANY, max(1, int(longest_s * asked.frequency_hz) - PERIODS))
+    if asked.share < 1.0:
+        most = min(most, max(1, int(asked.share * asked.cycle_s * asked.frequency_hz)))
     if not (runs(design) and follows_angle(design) and asked.ramp_s > 0.0 and asked.share == 1.0):
-        return 1
+        nearest = Fraction(updates).limit_denominator(most)
+        return nearest.denominator, nearest.numerator
     turns = asked.size_of(design) * (1.0 / asked.frequency_hz - asked.ramp_s) / (2.0 * pi)
-    return min(range(1, min(most, MANY) + 1), key=lambda k: abs(k * turns - round(k * turns)))
+    periods = min(range(1, most + 1), key=lambda k: abs(k * turns - round(k * turns)))
+    return periods, round(periods * updates)
 
 
 def _overload(design: Design, asked: Asked, current: Floats, held: float) -> Overload | None:

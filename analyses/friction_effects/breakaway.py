@@ -66,7 +66,7 @@ def static_threshold(design: Design, load_Nm: float = 0.0) -> StaticThreshold:
 
 
 FRACTIONS = (0.2, 0.3, 0.5, 0.7, 0.9)
-WITHIN, COUNT = 0.05, 51
+WITHIN, RESOLUTION = 0.05, 2e-3  # of the threshold: beyond it something has to move, and it is known to
 
 
 @dataclass(frozen=True)
@@ -108,10 +108,14 @@ def threshold(design: Design, load_Nm: float) -> Threshold | None:
         times = zip(sizes.tolist(), _first_motion_s(design, load_Nm, sizes), strict=True)
         waiting = tuple(Waiting(size, static.waiting_time_s(size), finite(time)) for size, time in times)
         return Threshold(static, waiting, None, 0.0)
-    sizes = static.forward_rad * np.linspace(1.0 - WITHIN, 1.0 + WITHIN, COUNT)
-    moved = _first_motion_s(design, load_Nm, sizes) < math.inf
-    first = float(sizes[np.argmax(moved)]) if moved.any() else None
-    return Threshold(static, (), first, 2.0 * WITHIN / (COUNT - 1))
+    low, high = 0.0, (1.0 + WITHIN) * static.forward_rad
+    if _first_motion_s(design, load_Nm, np.array([high]))[0] == math.inf:
+        return Threshold(static, (), None, RESOLUTION)
+    while high - low > RESOLUTION * static.forward_rad:  # a current that overshoots moves it before
+        size = 0.5 * (low + high)
+        moves = _first_motion_s(design, load_Nm, np.array([size]))[0] < math.inf
+        low, high = (low, size) if moves else (size, high)
+    return Threshold(static, (), high, RESOLUTION)
 
 
 def _first_motion_s(design: Design, load_Nm: float, sizes: np.ndarray) -> np.ndarray:

@@ -7,8 +7,7 @@ import numpy as np
 from scipy.optimize import root_scalar
 
 from actuator_lti.design.model import Design
-from actuator_lti.design.plant import torque_per_command
-from actuator_lti.drive.steady import motor_torque_Nm
+from actuator_lti.drive.steady import drive_gain, filtered, motor_torque_Nm
 from actuator_lti.types import Floats
 from analyses.friction_effects.breakaway import StaticThreshold
 from analyses.friction_effects.orbit import Orbit
@@ -49,8 +48,8 @@ def hysteresis(design: Design, load_Nm: float, static: StaticThreshold, settling
     ticks = 4 * every * round(ticks / (4 * every))
     period = ticks * design.controller.period_s
     smallest = min(design.validation.amplitude_fractions) * design.validation.full_deflection_rad
-    unaided = replace(design.controller.position_loop, friction_feedforward=0.0)
-    tight, play = replace(design, controller=replace(design.controller, position=unaided)), 0.0
+    unfed, play = replace(design.controller.position_loop, friction_feedforward=0.0), 0.0
+    tight = replace(design, controller=replace(design.controller, position=unfed))
     if design.coupling is not None:
         play = design.coupling.play_rad / design.ratio_behind_coupling
         tight = replace(tight, coupling=replace(design.coupling, play_rad=0.0))
@@ -104,7 +103,7 @@ def lost_predicted_rad(
 def _lag_rad(design: Design, load_Nm: float, static: StaticThreshold, way: float, orbit: Orbit) -> float:
     """Command less output while the drive slides through zero of the command, forward or backward."""
     loop, load, gain = design.controller.position_loop, design.load, static.torque_gain_Nm_rad
-    fed = loop.friction_feedforward * torque_per_command(design) / gain if loop.friction_feedforward else 0.0
+    fed = loop.friction_feedforward * float(drive_gain(design) * filtered(design, "torque")) / gain
     breakaway = 0.5 * (static.forward_rad + static.backward_rad) - fed
 
     def sliding(lag: float, sense: float) -> tuple[OperatingMotion, float]:

@@ -17,7 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from actuator_lti.design.model import Design
-from actuator_lti.drive.facts import passed_moment_Nm
+from actuator_lti.drive.facts import passed_moment_Nm, stall_torque_Nm
 from actuator_lti.drive.operating import Operating, holding_moment_Nm, level, rubs
 from actuator_lti.drive.profile import command_mean
 from actuator_lti.drive.wiring import wire
@@ -30,7 +30,7 @@ from analyses.large_signal.tones import FAINT, TANH_TOLERANCE, full_range, tone
 from analyses.linear.responses import response_at
 from analyses.validation.places import Bench
 from nonlinear import LIMITERS, Rows
-from nonlinear.bench.operating_motion import OperatingMotion, full_torque_Nm
+from nonlinear.bench.operating_motion import OperatingMotion
 
 NO_MOTION = 1e-3  # of the command
 UPDATES = 400  # of the position loop in a window
@@ -229,7 +229,7 @@ def _travel_s(design: Design, stage: str, part: float) -> float:
     if stage == "current":
         return 0.0
     sizes = full_range(design)
-    speeding = design.inertia_kgm2 * sizes["velocity"] / full_torque_Nm(design)
+    speeding = design.inertia_kgm2 * sizes["velocity"] / stall_torque_Nm(design)
     if stage == "velocity":
         return part * speeding
     return part * sizes["position"] * design.total_ratio / sizes["velocity"] + 2.0 * speeding

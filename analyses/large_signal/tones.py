@@ -113,11 +113,13 @@ def triangle_start(design: Design, rows: Rows, amplitude_rad: np.ndarray, limite
     rows["speed_start"][which] = rows["speed_command_start"][which] = limit
     current, voltage = steady_input(design, speed_torque_Nm(design, limit), limit)
     rows["current_start"][which], rows["voltage_start"][which] = current, voltage
-    if design.controller.current is None:
-        rows["velocity_integrator_start"][which] = voltage
-    else:
-        rows["velocity_integrator_start"][which] = rows["current_command_start"][which] = current
-        rows["current_integrator_start"][which] = voltage
+    inner, asked = design.controller.current, voltage
+    if inner is not None:
+        rows["current_command_start"][which] = asked = current
+        if inner.integral_time_s is not None:  # without an integral it would keep what it begins with
+            rows["current_integrator_start"][which] = voltage
+    if design.controller.velocity.integral_time_s is not None:
+        rows["velocity_integrator_start"][which] = asked
 
 
 LEAST_UPDATES = 96  # updates of the position loop in a window: peaks are seen to 1 - cos(pi/96) = 0.05 %

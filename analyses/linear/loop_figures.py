@@ -18,8 +18,10 @@ from typing import Any, TypeVar
 from actuator_lti.asked.quantities import MOST_RESONANCE_DB
 from actuator_lti.bandwidth import Bandwidth, Peaks, closed_loop_bandwidth, peaks
 from actuator_lti.design.model import Design, Requirement
+from actuator_lti.design.plant import torque_per_command
 from actuator_lti.drive.operating import RotorState, pushes_away
 from actuator_lti.drive.profile import CommandMean, command_mean, profile_note
+from actuator_lti.drive.steady import drive_gain
 from actuator_lti.drive.wiring import wire
 from actuator_lti.errors import InputError, NumericalError
 from actuator_lti.loops import Loop, Loops, sampled
@@ -199,6 +201,8 @@ def all_loop_figures(
                 result[name] = loop_figures(loop, step=step, certify=certify)
             if name == "velocity" and result[name].stable:
                 result[name] = _with_speed_told(loops.design, result[name])
+            if name == "current" and result[name].stable:
+                result[name] = _with_feedforward_told(loops.design, result[name])
             if name == "current" and wanted:
                 own = partial(_locked, loops, step=step, certify=certify)
                 with_it = own() if needed else attempt("current loop with the rotor locked", own, None)
@@ -230,6 +234,16 @@ def _with_speed_told(design: Design, figures: LoopFigures) -> LoopFigures:
         return figures
     note = "velocity loop: bandwidth and step are of the measured speed, behind its estimate and filters"
     return replace(figures, notes=(*figures.notes, note))
+
+
+def _with_feedforward_told(design: Design, figures: LoopFigures) -> LoopFigures:
+    """The same of a current loop with a note on the feed-forward that its closed loop is without."""
+    current = design.controller.current
+    if current is None or current.resistance_feedforward == 0.0:
+        return figures
+    given = drive_gain(design) / torque_per_command(design)
+    note = "current loop: all of this is of the feedback alone; with control.current.resistance_feedforward"
+    return replace(figures, notes=(*figures.notes, f"{note} a constant command gives {given:.4g} of it"))
 
 
 MATTERS = 0.01  # of a margin

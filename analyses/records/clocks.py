@@ -18,6 +18,7 @@ GRID = 4000
 MIN_QUALITY = 0.5
 RATE_STD_MAX = 1e-3
 ROUNDS = 50
+NEAR = 1e-4  # steps of the grid
 
 
 class Mismatch(InputError):
@@ -238,15 +239,16 @@ def _gauss_newton(pair: _Pair, parameters: int) -> tuple[Floats, Floats]:
     To the noise is added how far apart in time the edges remain on the mean: two instruments do not
     see the same happening in quite the same shape, and no fit can tell that from a shift.
     """
-    p = np.zeros(parameters)
-    for _ in range(ROUNDS):
-        steps = 0.5 * np.eye(parameters)
-        jac = np.column_stack([pair.residual(p + h) - pair.residual(p - h) for h in steps])
-        change = np.linalg.lstsq(jac, pair.residual(p), rcond=None)[0]
-        p = p - np.clip(change, -5.0, 5.0)
-        if np.max(np.abs(change)) < 1e-4:
-            break
+    p, steps = np.zeros(parameters), 0.5 * np.eye(parameters)
     rest = pair.residual(p)
+    for _ in range(ROUNDS):
+        jac = np.column_stack([pair.residual(p + h) - pair.residual(p - h) for h in steps])
+        change = np.clip(np.linalg.lstsq(jac, rest, rcond=None)[0], -5.0, 5.0)
+        while (left := pair.residual(p - change)) @ left > rest @ rest and np.max(np.abs(change)) >= NEAR:
+            change *= 0.5  # a whole step would go to and fro over a kink
+        p, rest = p - change, left
+        if np.max(np.abs(change)) < NEAR:
+            break
     variance = float(rest @ rest) / max(len(rest) - 2 - parameters, 1) * correlation_time(rest)
     covariance = np.asarray(variance * np.linalg.pinv(jac.T @ jac))
     steep = np.abs(jac[:, 0]) > 0.05 * np.max(np.abs(jac[:, 0]))

@@ -144,8 +144,11 @@ class _File:
             table = pc.read_csv(pa.BufferReader(data), read, parse, convert)
         except (pa.ArrowException, UnicodeDecodeError):
             return None
-        values = np.column_stack([table.column(names[position]).to_numpy() for position in positions])
-        if table.num_rows != lines or np.isnan(values).all(axis=1).any() or np.isinf(values).any():
+        if table.num_rows != lines:
+            return None
+        whole = table.combine_chunks().to_batches()[0].to_tensor(null_to_nan=True)  # columns load pandas
+        values = whole.to_numpy()[:, [wanted.index(names[position]) for position in positions]]
+        if np.isnan(values).all(axis=1).any() or np.isinf(values).any():
             return None
         return Block(values=values, lines=np.arange(first_line, first_line + lines))
 

@@ -3,9 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
-from numpy.polynomial.legendre import legvander
 from scipy.fft import irfft, next_fast_len, rfft
-from scipy.linalg import solve_triangular
 from scipy.stats import chi2
 
 from actuator_lti.errors import InputError
@@ -19,6 +17,7 @@ from analyses.records.steady_window import CRITERION, find_steady_window
 GRID = 40_000  # points over the longer record, at most
 ROUNDING = 1e-9
 ORDERS = 64  # polynomials over the steady time: what bends faster than a quarter of them is noise
+PER_ROOT = 2.0  # times the square root of the rows: as many orders as equally spaced rows tell apart
 
 
 def by_current(drive: Record, sensor: Record, join: ClockJoin, signal: str) -> ClockJoin:
@@ -69,12 +68,12 @@ def _against_the_best(current: Floats, load: Floats) -> tuple[Floats, float]:
     Shapes (n,) and (m,), m > n; the ratios have shape (m - n + 1,).
     """
     n, load, total = len(current), load - load.mean(), float(current @ current)
-    columns = legvander(np.linspace(-1.0, 1.0, n), min(ORDERS, n) - 1)
-    waves = solve_triangular(np.linalg.qr(columns, mode="r"), columns.T, trans="T")
+    waves = _polynomials(n, min(ORDERS, int(PER_ROOT * np.sqrt(n))))
     drift, squares, own = slow_shares(len(waves)), np.append(0.0, np.cumsum(load**2)), waves @ current
     size = next_fast_len(len(load), real=True)  # what wraps around is not among the places
-    spectra = rfft(load, size) * rfft(np.vstack([waves, current]), size).conj()
-    placed = irfft(spectra, size)[:, : len(load) - n + 1]
+    spectra = np.conj(spectra := rfft(np.vstack([waves, current]), size), out=spectra)
+    spectra *= rfft(load, size)
+    placed = irfft(spectra, size, overwrite_x=True)[:, : len(load) - n + 1]
     power = squares[n:] - squares[:-n] - drift @ placed[:-1] ** 2
     beside = np.maximum(placed[-1] - (drift * own) @ placed[:-1], 0.0)
     seen = power > ROUNDING * squares[-1]
@@ -88,3 +87,16 @@ def _against_the_best(current: Floats, load: Floats) -> tuple[Floats, float]:
         worth = n / correlation_time(rest - (drift[cut] * (waves @ rest)) @ waves)
     ratio = np.min(minus, axis=0) - minus[cut, best]
     return ratio, float(np.sqrt(1.0 - left[cut, best] / alone[cut]))
+
+
+def _polynomials(rows: int, orders: int) -> Floats:
+    """The first orthonormal polynomials over equally spaced rows (Gram's), shape (orders, rows).
+
+    By their recurrence, which loses digits beyond twice the square root of the rows.
+    """
+    k, x, waves = np.arange(orders), np.linspace(1.0 - rows, rows - 1.0, rows), np.zeros((orders, rows))
+    steps = np.sqrt(k * k * (rows * rows - k * k) / (4.0 * k * k - 1.0))
+    waves[0] = 1.0 / np.sqrt(rows)
+    for n in k[1:]:
+        waves[n] = (x * waves[n - 1] - steps[n - 1] * waves[n - 2]) / steps[n]
+    return waves

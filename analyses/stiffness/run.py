@@ -16,6 +16,7 @@ from actuator_lti.design.model import Design, LoadFriction
 from actuator_lti.drive.operating import Operating, OperatingPoint, stiffness_there
 from actuator_lti.errors import InputError, UnstableError
 from actuator_lti.loops import stiffness as linear
+from analyses.motion.settling import settling_ticks_of
 from analyses.specification.requirements import RequirementVerdict, judged_by, tally
 from nonlinear import commands, simulate, tangent
 from nonlinear.bench.loop_setup import HELD, LoopSetup
@@ -124,7 +125,7 @@ class Stiffness:
 
 AGREED, READ = 1e-6, 1e-5
 _MOST_TICKS = 400_000
-SKIPPED = 6  # periods at rest, before one is looked at
+SKIPPED, LEFT = 6, 1e-4  # periods at rest, before one is looked at; what is left by then of the slowest mode
 PERIODS_WITHIN = 10  # of the load on the spring, within the part of the loading that is read
 POINTS = 20_000
 TIME_CONSTANTS = 20.0  # of the damped load on the spring, waited at each reading
@@ -168,13 +169,15 @@ def _ways(design: Design) -> list[OperatingPoint]:
 def stiffness_at_rest(design: Design, asked: Sequence[tuple[float, float]]) -> tuple[AtRest, ...]:
     """Fundamental stiffness of the drive as it is, command held, at (frequency in Hz, moment in N m)."""
     made, period, every = [], design.controller.period_s, design.controller.position_loop.every
+    settling = settling_ticks_of(design, LEFT)
     for frequency, amplitude in asked:
         ticks = max(4, round(1.0 / (frequency * period * every))) * every  # a period: whole updates
-        count, turn = (SKIPPED + 2) * ticks, np.exp(-2j * np.pi * np.arange(ticks) / ticks)
-        moment = np.tile(-amplitude * turn.imag, SKIPPED + 2)
+        skipped = max(SKIPPED, ceil(min(settling, _MOST_TICKS) / ticks))
+        count, turn = (skipped + 2) * ticks, np.exp(-2j * np.pi * np.arange(ticks) / ticks)
+        moment = np.tile(-amplitude * turn.imag, skipped + 2)
         run = simulate(design, commands.hold(), count * period, series(np.arange(count) * period, moment))
         both = (moment, run.output_angle_rad - run.output_angle_rad[-1])  # at rest: 0 to the last digit
-        given, seen = ((signal[SKIPPED * ticks :].reshape(2, ticks) @ turn).sum() for signal in both)
+        given, seen = ((signal[skipped * ticks :].reshape(2, ticks) @ turn).sum() for signal in both)
         K = complex(given / seen) if seen != 0.0 else complex(np.inf)
         made.append(AtRest(amplitude, 1.0 / (ticks * period), K))
     return tuple(made)

@@ -2,7 +2,7 @@
 
 import os
 import re
-from collections.abc import Collection, Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from math import inf
@@ -28,6 +28,7 @@ GAINS = tuple(f"control.{loop}.{key}" for loop in LOOPS for key in ("gain", "int
 SPAN = 50.0  # a gain may leave what it is and what the rules say by this factor
 MOST_FACTORS = 10
 PLENTY = 10.0  # relative distance beyond which the search does not look
+_Looked = tuple[Population, LinearFigures]
 MOST_DESIGNS = 25_000  # looked at in one search: half a minute of one processor for a drive with two masses
 
 
@@ -48,6 +49,7 @@ class Problem:
     lower: Floats = field(init=False)
     upper: Floats = field(init=False)
     _linear: Floats = field(init=False)
+    _last: tuple[object, _Looked] | None = field(default=None, init=False, repr=False)
 
     def __post_init__(self) -> None:
         self.paths = tuple(item.path for item in self.variables)
@@ -133,8 +135,7 @@ class Problem:
         of the loops whose poles are known; inf where nothing bounds the figure. ``factors`` are those of the
         corners, where not those of the problem.
         """
-        population = self._looked_at(gains, corners, self.factors if factors is None else factors)
-        linear = _linear_figures(population, self._timed)
+        population, linear = self._looked_at(gains, corners, self.factors if factors is None else factors)
         columns = loop_columns(linear, self.design)
         for name, load in {(r.quantity, r.load_Nm or 0.0) for r in self.requirements}:
             if name in DRIVE_QUANTITIES:
@@ -154,15 +155,20 @@ class Problem:
 
     def figure(self, quantity: str, loop: str, gains: Floats, corners: Floats) -> Floats:
         """One figure of one loop, shape (candidates, corners)."""
-        population = self._looked_at(gains, corners, self.factors)
-        linear = _linear_figures(population, {loop} if QUANTITIES[quantity].timed else ())
+        _, linear = self._looked_at(gains, corners, self.factors)
         return linear.quantity(quantity, loop).reshape(len(gains), len(corners))
 
-    def _looked_at(self, gains: Floats, corners: Floats, factors: tuple[Factor, ...]) -> Population:
-        """Every candidate at every corner, and the search's account of them."""
-        count = len(gains) * len(corners)
-        self.evaluations += count
-        return Population(self.design, self.values_at(gains, corners, factors), count)
+    def _looked_at(self, gains: Floats, corners: Floats, factors: tuple[Factor, ...]) -> _Looked:
+        """Every candidate at every corner and its loops, kept for the next question on the same ones."""
+        of = (gains.tobytes(), corners.tobytes(), factors)
+        if self._last is None or self._last[0] != of:
+            count = len(gains) * len(corners)
+            self.evaluations += count
+            population = Population(self.design, self.values_at(gains, corners, factors), count)
+            threads = os.cpu_count() or 1
+            linear = linear_figures(population, time_figures=self._timed, held=True, threads=threads)
+            self._last = of, (population, linear)
+        return self._last[1]
 
     def values_at(self, gains: Floats, corners: Floats, factors: tuple[Factor, ...]) -> dict[str, Floats]:
         """SI values of every candidate at every corner by key, each of shape (candidates * corners).
@@ -179,10 +185,6 @@ class Problem:
             away = share * (values[factor.path] - factor.nominal)
             values[factor.path] = np.clip(middle + away, own.lower, own.upper)
         return values
-
-
-def _linear_figures(population: Population, timed: Collection[str]) -> LinearFigures:
-    return linear_figures(population, time_figures=timed, held=True, threads=os.cpu_count() or 1)
 
 
 def asked_for(design: Design, extra: tuple[Requirement, ...] = ()) -> tuple[Requirement, ...]:

@@ -14,9 +14,10 @@ from scipy.optimize import bisect
 
 from actuator_lti.design.model import Command, Controller, Design, Instruments, Limits, Motor
 from actuator_lti.design.plant import reachable_speed
+from actuator_lti.drive.facts import stall_torque_Nm
 from actuator_lti.drive.operating import dry_torque
 from analyses.validation.row import WITHIN, Row, judged
-from nonlinear.bench.operating_motion import OperatingMotion, full_torque_Nm, operating_motion_at
+from nonlinear.bench.operating_motion import OperatingMotion, operating_motion_at
 from nonlinear.rows import Rows
 from nonlinear.runs.running import Running
 
@@ -65,7 +66,7 @@ def loads_of(design: Design) -> tuple[float, ...]:
     """No load, and every named one with either sign; where none is, a share of the full torque."""
     named = [abs(load) for load in (*design.validation.loads_Nm, design.load.moment_max_Nm) if load]
     if not named:
-        full = full_torque_Nm(design) * design.total_ratio
+        full = stall_torque_Nm(design) * design.total_ratio
         named = [SHARE * full if isfinite(full) else 1.0]
     return tuple(sorted({0.0, *named, *(-load for load in named)}))
 

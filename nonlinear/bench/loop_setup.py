@@ -14,11 +14,12 @@ from math import inf, lcm
 from actuator_lti.design.control import FEED_FORWARD
 from actuator_lti.design.model import Design
 from actuator_lti.design.plant import reachable_speed
+from actuator_lti.drive.facts import stall_torque_Nm
 from actuator_lti.drive.wiring import Drive, wire
 from actuator_lti.errors import InputError
 from nonlinear._kernels import layout as at
 from nonlinear.bench import operating_motion as motion
-from nonlinear.bench.operating_motion import OperatingMotion, full_torque_Nm
+from nonlinear.bench.operating_motion import OperatingMotion
 from nonlinear.bench.probe import Probe
 from nonlinear.bench.steady_control import own_start, steady_state
 from nonlinear.rows import Rows
@@ -205,7 +206,7 @@ class LoopSetup:
         speed = min(reachable_speed(design), self.bias.speed_rad_s or inf)
         ranges = {"u": limits.voltage_V, "i_ref": limits.peak_current_A, "w_ref": speed, "output": full}
         if self.loop == "load":
-            return full_torque_Nm(design) * design.total_ratio
+            return stall_torque_Nm(design) * design.total_ratio
         if self.loop == "command":
             outermost = design.controller.outermost
             ranges |= {"position": full, "velocity": speed / design.total_ratio}

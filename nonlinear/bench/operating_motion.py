@@ -14,7 +14,7 @@ import numpy as np
 from actuator_lti.design.model import Command, Coupling, Design, Friction, Instruments, LoadFriction, Sensor
 from actuator_lti.design.plant import reachable_speed
 from actuator_lti.drive import operating
-from actuator_lti.drive.facts import passed_moment_Nm, slopes_torque
+from actuator_lti.drive.facts import passed_moment_Nm, slopes_torque, stall_torque_Nm
 from actuator_lti.drive.operating import Operating, follows_angle, holding_moment_Nm, holding_torque_Nm
 from actuator_lti.drive.steady import motor_torque_Nm, steady_input
 from actuator_lti.errors import InputError
@@ -87,7 +87,7 @@ def operating_motion(design: Design) -> OperatingMotion:
     if needs_press(design):
         passed = 1.0 if design.load.path == "back-drivable" else 0.0
         felt = max(passed + design.friction.load_coefficient * design.total_ratio, 1e-12)
-        whole = full_torque_Nm(design) * design.total_ratio / felt  # by the motor torque that it costs
+        whole = stall_torque_Nm(design) * design.total_ratio / felt  # by the motor torque that it costs
         loads = [-part * whole for part in PRESSED]
     for share in (SHARE, MOST):
         for moment in loads:
@@ -127,7 +127,7 @@ def creeping(design: Design, *, driven: bool = False) -> OperatingMotion:
     """
     pressed, coupling = 0.0, design.coupling
     if coupling is not None:
-        pressed = min(PRESSED[0] * full_torque_Nm(design) * design.ratio_to_coupling, _piece_Nm(coupling))
+        pressed = min(PRESSED[0] * stall_torque_Nm(design) * design.ratio_to_coupling, _piece_Nm(coupling))
         pressed *= design.ratio_behind_coupling * (1.0 if driven else -1.0)
     motion = operating_motion_at(design, SLOWEST * FASTEST_RAD_S, pressed)
     current, voltage = steady_input(design, 0.0, motion.speed_rad_s)
@@ -165,7 +165,7 @@ def standing(design: Design) -> OperatingMotion:
         return OperatingMotion(0.0, 0.0, 0.0, False, carried, extra_Nm=torque)
     coupling_Nm = carried / design.ratio_behind_coupling
     if coupling.play_rad > 0.0 and abs(coupling_Nm) < _closing_Nm(coupling):
-        press = PRESSED[0] * full_torque_Nm(design) * design.ratio_to_coupling
+        press = PRESSED[0] * stall_torque_Nm(design) * design.ratio_to_coupling
         coupling_Nm = max(press, _closing_Nm(coupling))
     twist = coupling.twist_rad(coupling_Nm)
     torque += passed_moment_Nm(design, coupling_Nm * design.ratio_behind_coupling)
@@ -195,13 +195,6 @@ def _closed(design: Design, motion: OperatingMotion) -> OperatingMotion:
     extra = motor_torque_Nm(design, held.current_A - motion.current_A, held.voltage_V - motion.voltage_V)
     twist, torque = held.twist_rad, held.coupling_Nm
     return replace(motion, load_Nm=load_Nm, twist_rad=twist, coupling_Nm=torque, extra_Nm=extra)
-
-
-def full_torque_Nm(design: Design) -> float:
-    """Torque that the motor reaches at its limits, at standstill."""
-    voltage, resistance = design.limits.voltage_V, design.effective_motor.resistance_ohm
-    short = voltage / resistance if resistance else voltage
-    return float(motor_torque_Nm(design, min(design.limits.peak_current_A, short), voltage))
 
 
 def _fastest(design: Design, load_Nm: float, share: float) -> OperatingMotion | None:

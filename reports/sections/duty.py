@@ -19,8 +19,9 @@ _SHOWN = 400
 def section(result: Duty) -> doc.Section:
     intro = (
         "The motion is simulated until its rms current is steady, friction, play and limits at work, the "
-        "overload protection left out. Its current, repeated without end, heats the winding by its mean "
-        "copper loss and drives the overload state."
+        "overload protection left out; a rest goes on from there. Their current, repeated without end, heats "
+        "the winding by its mean copper loss and drives the overload state. Power is of copper and shaft: a "
+        "supply or brake resistor takes what comes back."
     )
     note = f"Duty: {asked_words(result)}."
     if runs(result.design) and follows_angle(result.design) and result.asked.share < 1.0:
@@ -98,9 +99,9 @@ def _rows(result: Duty) -> list[doc.Row]:
         (f"motor {push}, rms over time", result.rms_torque_Nm, unit),
         (f"motor {push}, peak", result.peak_torque_Nm, unit),
         ("copper loss, mean", result.copper_W, "W"),
-        ("power from the supply, mean", result.mean_power_W, "W"),
-        ("power from the supply, peak", result.peak_power_W, "W"),
-        ("power back to the supply, peak", result.fed_back_W, "W"),
+        ("power into the motor, mean", result.mean_power_W, "W"),
+        ("power into the motor, peak", result.peak_power_W, "W"),
+        ("power back from the motor, peak", result.fed_back_W, "W"),
     )
     rows += [_row(what, value, math.inf, unit) for what, value, unit in figures]
     rows += [_row("overload state, peak", over.peak, 1.0, "", over.acts_after_s)] if over else []
@@ -118,7 +119,8 @@ def _figure(result: Duty) -> doc.Block:
     chart = style.Chart(width=style.WIDE, height=320.0)
     panel, rows = chart.panel(y="current, A", title="One period of the motion"), result.period_ticks
     every, last = max(1, rows // _SHOWN), float(result.time_s[rows - 1])
-    scale, first = style.time_axis(panel, last), int(np.argmax(np.abs(result.current_A))) // rows * rows
+    largest = int(np.argmax(np.abs(result.current_A)))
+    scale, first = style.time_axis(panel, last), min(largest // rows * rows, result.current_A.size - rows)
     current = result.current_A[first : first + rows : every]
     panel.curve(result.time_s[:rows:every] * scale, current, "current", **style.series(0))
     panel.rule_y(result.rms_A, "rms of the duty", seen=True, colour=style.BLUE, dash=1)
@@ -126,7 +128,8 @@ def _figure(result: Duty) -> doc.Block:
         panel.rule_y(result.continuous_A, "continuous", seen=True, colour=style.RED, dash=2)
     panel.x.limits(0.0, last * scale)
     periods = len(result.time_s) // rows
-    most = f", the largest of {periods}, which come nearest to whole turns of the load" * (periods > 1)
+    whole = "turns of the load" if runs(result.design) and follows_angle(result.design) else "ticks"
+    most = f", the largest of {periods}, which come nearest to whole {whole}" * (periods > 1)
     caption = f"Motor current over one period of the motion{most}."
     if result.heating is not None:
         caption += " Right: the winding from ambient."

@@ -15,6 +15,7 @@ from actuator_lti.design.access import stacked
 from actuator_lti.design.model import Design, Limits
 from actuator_lti.drive.facts import RATE_LIMITS, Capability, breakaway_torque_Nm, capability, stall_torque_Nm
 from actuator_lti.drive.steady import torque_gain_Nm_rad
+from analyses.linear.loop_figures import all_loop_figures
 from analyses.specification.capability import drive_figures
 from nonlinear import commands, simulate
 from tests.changed import changed
@@ -131,6 +132,8 @@ def test_torque_gain_with_a_p_current_loop_and_resistance_feedforward() -> None:
     design = controlled(drive_e(), current={"integral_time_s": None, "resistance_feedforward": 0.6})
     share = (0.8 + 0.3) / (0.8 + 0.5)
     assert torque_gain_Nm_rad(design) == pytest.approx(20.0 * 10 * 0.05 * 0.05 * share)
+    notes = all_loop_figures(assemble_loops(design))["current"].notes
+    assert any(f"resistance_feedforward a constant command gives {share:.4g} of it" in note for note in notes)
 
 
 @pytest.mark.parametrize("name", DRIVES)

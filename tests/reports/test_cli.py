@@ -34,6 +34,11 @@ def loaded(code: str) -> set[str]:
 
 
 PLOTTING = {"control", "matplotlib", "scipy.signal", "scipy.stats", "pandas"}
+READ = """import tempfile; from analyses.records.open_record import open_record
+with tempfile.NamedTemporaryFile("w", suffix=".csv") as file:
+    file.write("time_s,speed_rad_s\\n0,1\\n1,2\\n2,nan\\n")
+    file.flush()
+    assert open_record(file.name).counts.rows_in == 3"""
 COMMAND = "from reports.cli.main import main; main({})"
 LIGHT = {
     "import actuator_lti": {"control", "numpy"},
@@ -41,6 +46,7 @@ LIGHT = {
     "from actuator_lti import load_design; load_design('ilr33-amber')": {"matplotlib"},
     COMMAND.format(["--help"]): {"numpy", "scipy", "control", "matplotlib", "pydantic", "pandas"},
     COMMAND.format(["margins", "ilr33-amber"]): PLOTTING | {"dask"},
+    READ: {"pandas", "scipy.signal"},
     COMMAND.format(["stiffness", "ilr33-amber", "--json"]): PLOTTING | {"dask"},
 }
 

@@ -134,6 +134,20 @@ def test_no_step_is_followed_that_no_requirement_is_on(monkeypatch):
     assert np.array_equal(distances[0, :, 0], 1.0 - whole.quantity("settling_time", "position"))
 
 
+def test_all_that_is_asked_of_the_same_designs_is_one_look_at_them():
+    """With a look at each question the joint's trade-off ended at its bound, two points not met."""
+    problem = problem_of(load_design("joint"), load_design("joint").requirements, {})
+    gains, corners = np.stack([problem.start, problem.present, problem.start]), problem.all_corners[:4]
+    chosen = problem.evaluations  # to choose the factors
+    width, _ = problem.figure("bandwidth", "position", gains, corners), problem.distances(gains, corners)
+    margin = problem.figure("phase_margin", "velocity", gains, corners)
+    assert problem.evaluations - chosen == 3 * 4
+    turned = gains[::-1][1:]  # others of these are another question
+    assert np.array_equal(problem.figure("phase_margin", "velocity", turned, corners), margin[::-1][1:])
+    assert np.array_equal(problem.figure("bandwidth", "position", gains[:2], corners[:2]), width[:2, :2])
+    assert problem.evaluations - chosen == 3 * 4 + 2 * 4 + 2 * 2
+
+
 def test_the_step_of_a_speed_drive_is_judged_by_its_speed():
     """w[k] = r (1 - (1 - a)^k) with a = K T/J: its levels lie on straight lines from tick to tick."""
     K, J, size, ticks = 1.0, 0.1, 0.5, 400

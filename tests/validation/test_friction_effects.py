@@ -15,7 +15,7 @@ from analyses.friction_effects.orbit import Orbit
 from analyses.friction_effects.result import limit_cycles
 from analyses.friction_effects.reversal import Hysteresis, _width, hysteresis
 from analyses.large_signal.tones import linear_steady_state
-from analyses.limit_cycles.stick_slip import _slip
+from analyses.limit_cycles.stick_slip import _slip, stick_slip_cycle
 from analyses.motion.settling import SMALL, settle, settlings_of
 from nonlinear import Rows
 from nonlinear.bench.operating_motion import quiet
@@ -28,6 +28,7 @@ from tests.nonlinear.elastic_drive import stribeck
 AMBER, EMPS, JOINT = (load_design(name) for name in ("ilr33-amber", "emps", "joint"))
 STIFFNESS = 5.9e-3 * 0.12 * 120.0 * 2376.0  # motor torque per error of the output of the first
 FIN = 1.0 / 60.0 + 1.7e-3  # motor torque per torque on the fin: what passes, and 10 % of it lost
+P_LOOPS = {"current": {"gain_V_A": 0.05, "integral_time_s": None}, "velocity": {"integral_time_s": None}}
 KICKS = {
     "feedforward": 1.0, "acceleration_feedforward": 1.0, "derivative_time": 1e-3, "friction_feedforward": 2.0,
 }  # fmt: skip
@@ -138,15 +139,6 @@ def test_an_orbit_of_short_stands_has_a_closed_form(T: float) -> None:
     assert replace(alone, rate_rad_s=0.1).at_zero_rad == 0.0  # the command turns before it breaks away
 
 
-@pytest.mark.parametrize("share", [0.0, 0.1, 0.5])
-def test_what_feeds_friction_forward_takes_lost_motion_away(share: float) -> None:
-    """The reversal loses what friction is more than that, 35.15 N/V of it, over the stiffness."""
-    fed = quiet(with_values(EMPS, {"control.position.friction_feedforward": share}))
-    loop = hysteresis(fed, 0.0, static_threshold(fed), 3000)
-    assert loop.predicted_rad == pytest.approx(2.0 * (20.3935 - 35.15065 * share) / FORCE, rel=1e-9)
-    assert loop.lost_motion_rad == pytest.approx(loop.predicted_rad, rel=1e-9)
-
-
 def test_a_width_is_that_of_the_periodic_state() -> None:
     passing = np.array([(-1.0) ** k * 0.35 + 0.2 * 0.8**k for k in range(3)])
     assert _width(passing) == pytest.approx(0.7, rel=1e-12)
@@ -226,6 +218,35 @@ def test_stick_slip_needs_breakaway_above_friction_and_an_integral() -> None:
         assert point.cycles.as_predicted
     emps = with_values(EMPS, {"friction.breakaway_ratio": 2.0})
     assert friction_effects(emps).points[0].cycles.stick_slip is None
+
+
+def test_a_p_current_loop_gives_a_part_of_its_command_and_overshoots_it() -> None:
+    """i ends at Kp/(Kp + R) of the command, after Kp/R (1 - exp(-2 R T/L)): it is seen two ticks later."""
+    slow = changed(AMBER, controller={"current": P_LOOPS["current"]})
+    sticky = quiet(
+        changed(slow, controller={"velocity": {"integral_time_s": 0.05}}, friction={"breakaway_ratio": 1.6})
+    )
+    cycle = stick_slip_cycle(sticky, 5.0)
+    swing = settle(sticky, 5.0, cycle.output_amplitude_rad)
+    assert swing.rest.frequency_hz == pytest.approx(cycle.frequency_hz, rel=2e-3)
+    assert swing.swing_rad == pytest.approx(cycle.output_amplitude_rad, rel=2e-3)
+    stiff = quiet(changed(AMBER, controller=P_LOOPS))
+    R, L, T = 0.055, 6e-6, stiff.controller.period_s
+    first = 0.05 / R * -math.expm1(-2.0 * R * T / L)
+    result = threshold(stiff, 5.0)
+    assert result.static.forward_rad == pytest.approx(8.95e-3 / STIFFNESS * (0.05 + R) / 0.05)
+    assert result.simulated_rad == pytest.approx(8.95e-3 / STIFFNESS / first, rel=2.0 * result.resolution)
+
+
+@pytest.mark.parametrize("design", [EMPS, changed(AMBER, controller=P_LOOPS)])
+def test_a_feed_forward_of_friction_takes_its_part_of_what_a_reversal_loses(design: model.Design) -> None:
+    """Found, against the drive without either, as predicted: of a P current loop the part that it gives."""
+    fed = changed(design, controller={"position": {"friction_feedforward": 0.3}})
+    for point, plain in zip(friction_effects(fed).points, friction_effects(design).points, strict=True):
+        lost, without = point.hysteresis, plain.hysteresis
+        assert lost.lost_motion_rad == pytest.approx(lost.predicted_rad, rel=1e-6)
+        assert lost.predicted_rad < 0.95 * without.predicted_rad
+        assert lost.linear_width_rad == pytest.approx(without.linear_width_rad, rel=1e-9)
 
 
 def test_a_stick_slip_cycle_is_not_foreseen_where_a_filter_holds_what_is_not_known() -> None:

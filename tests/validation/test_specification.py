@@ -214,11 +214,34 @@ def test_a_slow_integral_is_waited_for_or_the_duty_is_not_judged(monkeypatch: py
     assert "is not steady" in section(short)["result"]
 
 
-@pytest.mark.parametrize(("share", "cycle_s"), [(0.4, 3.0), (0.4, 40.0), (1.0, 1.0)])
-def test_the_overload_state_of_motion_and_rest_is_its_recursion(share: float, cycle_s: float) -> None:
+def test_a_rest_goes_on_from_the_motion_and_a_period_of_no_whole_ticks_is_played_as_asked() -> None:
+    """The second of two whole cycles: friction holds there what the motion has left."""
+    asked = Asked.of(JOINT, amplitude_rad=0.2, frequency_hz=1.0, load_Nm=40.0, share=0.3, cycle_s=20.0)
+    t = np.arange(0.0, 40.0, 5e-4)
+    command = commands.sampled(t, np.where(t % 20.0 < 6.0, 0.2 * np.sin(2.0 * np.pi * t), 0.0))
+    whole = simulate(replace(JOINT, limits=replace(JOINT.limits, peak_time_s=None)), command, 40.0, 40.0)
+    rest = whole.current_A[round(26.0 / JOINT.controller.period_s) :]
+    result = duty(JOINT, asked)
+    assert result.holding_A == pytest.approx(np.sqrt(np.mean(rest**2)), rel=1e-3)
+    assert result.peak_A == pytest.approx(np.abs(rest).max(), rel=1e-3)
+    result = duty(
+        JOINT, Asked.of(JOINT, amplitude_rad=1e-3, frequency_hz=60.0, load_Nm=0.0)
+    )  # 33 1/3 updates
+    spectrum = np.abs(np.fft.rfft(result.current_A - result.current_A.mean()))
+    seconds = result.time_s.size * JOINT.controller.period_s
+    assert np.argmax(spectrum) / seconds == pytest.approx(60.0, rel=1e-12)
+    assert "nearest to whole ticks" in section(result)["blocks"][-1]["caption"]
+
+
+@pytest.mark.parametrize(
+    ("share", "cycle_s", "hz"), [(0.4, 3.0, 1.0), (0.4, 3.0, 0.987), (0.4, 40.0, 1.0), (1.0, 1.0, 1.0)]
+)
+def test_the_overload_state_of_motion_and_rest_is_its_recursion(
+    share: float, cycle_s: float, hz: float
+) -> None:
     """Tick by tick from the cold drive: 40 % of the cycle in motion, whole periods or not, 60 % at rest."""
     design = with_overrides(JOINT, {"limits.peak_time": "5 s", "limits.continuous_current": "4 A"})
-    asked = Asked.of(design, amplitude_rad=0.3, frequency_hz=1.0, load_Nm=70.0, share=share, cycle_s=cycle_s)
+    asked = Asked.of(design, amplitude_rad=0.3, frequency_hz=hz, load_Nm=70.0, share=share, cycle_s=cycle_s)
     result, Ts = duty(design, asked), design.controller.period_s
     ticks = round(share * cycle_s / Ts)
     moving = (np.resize(result.current_A, ticks) / 4.0) ** 2

@@ -79,7 +79,7 @@ def test_a_trapezoid_of_speed_is_inertia_and_friction() -> None:
     made = duty_section(result)
     assert "0 to 11.5 deg/s and back in 250 ms each, at 0.5 Hz under 0 N m" in made["result"]
     rows = {row["what"]: row["value"] for row in made["blocks"][0]["rows"]}
-    assert rows["power from the supply, mean"] == result.mean_power_W
+    assert rows["power into the motor, mean"] == result.mean_power_W
 
 
 def test_a_load_that_turns_with_its_drive_counts_at_every_angle() -> None:

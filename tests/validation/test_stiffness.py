@@ -152,6 +152,17 @@ def test_at_rest_play_softens_small_moments(moment: float) -> None:
     assert abs(result.seen_Nm_rad) == pytest.approx(by_hand, rel=0.01)
 
 
+def test_at_rest_a_slow_integral_is_waited_for() -> None:
+    """Without friction and counts it is the linear stiffness; 6 periods of 20 Hz are 0.3 s of 4."""
+    bare, uncounted = {"friction": None, "gravity": None}, {"counts_per_rev": None}
+    smooth = {"dry_torque_Nm": 0.0, "load_coefficient": 0.0}
+    design = changed(
+        load_design("joint"), friction=smooth, load=bare, encoder=uncounted, output_encoder=uncounted
+    )
+    (result,), (check,) = stiffness_at_rest(design, [(20.0, 1.0)]), check_stiffness(design, (20.0,))
+    assert result.seen_Nm_rad == pytest.approx(check.foreseen_Nm_rad, rel=1e-4)
+
+
 @pytest.mark.parametrize("mass", [0.0, 1.0])
 def test_at_rest_dry_friction_holds_a_small_moment(mass: float) -> None:
     """Less than the load's dry friction, 0.05 N m, moves it neither in the gap nor bent by a weight."""
