@@ -8,6 +8,7 @@ import numpy as np
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError, NumericalError
 from actuator_lti.types import Floats, Mask
+from analyses.correlation.closed_loop import with_zero
 from analyses.correlation.following import Followed, followed
 from analyses.estimation.least_squares import covariance_of, independent, information_of, solve, told_apart
 from analyses.estimation.parameters import Parameter, parameter
@@ -107,9 +108,10 @@ def diagnosed(
 def _followed(start: Design, record: Record, simulated: Mapping[str, Floats]) -> Followed | None:
     """As `followed`; where what was found does not even move as the record, by the design's own motion."""
     one = followed(start, record, simulated)
-    if one is None or one.alike >= ALIKE:
-        return one
-    return followed(start, record, with_model_signals(start, simulated_part(start, record)).signals)
+    if one is not None and one.alike < ALIKE:
+        simulated = with_model_signals(start, simulated_part(start, record)).signals
+        one = followed(start, record, simulated)
+    return with_zero(start, record, one)
 
 
 def _with_doubts(
