@@ -311,7 +311,7 @@ def _torque(design: Design, record: Record, motion: Motion, recipe: Recipe) -> t
 
 
 def driven_rows(design: Design, record: Record, rows: Rows) -> Callable[[Record], Floats]:
-    """The drive torque at the rows of a record, of records that differ from it in their drive signal alone."""
+    """The drive torque at the rows of a record, of others that differ from it in the drive signal alone."""
     design, recipe = record.drive(design), rows.recipe
     motion = _balance(design, prepared(record), recipe, gravity=False).motion
 
