@@ -12,9 +12,8 @@ import numpy as np
 from scipy.optimize import brentq
 
 from actuator_lti.design.model import Design
-from actuator_lti.design.plant import torque_per_command
 from actuator_lti.drive.facts import breakaway_torque_Nm
-from actuator_lti.drive.steady import steady_input
+from actuator_lti.drive.steady import drive_gain, steady_input
 from actuator_lti.loops import Loops, assemble_loops
 from analyses.large_signal.tones import AT_REST, linear_steady_state, without_value
 
@@ -109,7 +108,7 @@ def _slip(design: Design, load_Nm: float, loops: Loops | None) -> _Slip | None:
     ticks = linear_steady_state(loops, np.array([1.0])).settling_ticks
     torque = breakaway_torque_Nm(design, load_Nm, 1)
     current, volts = steady_input(design, torque, 0.0)
-    start = torque / torque_per_command(design)
+    start = torque / float(drive_gain(design))
     gain = velocity.gain * control.position_loop.gain
     held = {"i": start, "velocity.I": start, "hold_i_ref": start}
     if design.motor.has_electrical_dynamics:

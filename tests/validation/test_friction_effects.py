@@ -2,15 +2,20 @@
 
 import json
 import math
+from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from actuator_lti import assemble_loops, load_design
 from actuator_lti.design import model, with_values
 from analyses.friction_effects import friction_effects
-from analyses.friction_effects.breakaway import Hysteresis, hysteresis, static_threshold, threshold
+from analyses.friction_effects.breakaway import static_threshold, threshold
+from analyses.friction_effects.orbit import Orbit
 from analyses.friction_effects.result import limit_cycles
-from analyses.limit_cycles.stick_slip import _slip
+from analyses.friction_effects.reversal import Hysteresis, _width, hysteresis
+from analyses.large_signal.tones import linear_steady_state
+from analyses.limit_cycles.stick_slip import _slip, stick_slip_cycle
 from analyses.motion.settling import SMALL, settle, settlings_of
 from nonlinear import Rows
 from nonlinear.bench.operating_motion import quiet
@@ -23,6 +28,7 @@ from tests.nonlinear.elastic_drive import stribeck
 AMBER, EMPS, JOINT = (load_design(name) for name in ("ilr33-amber", "emps", "joint"))
 STIFFNESS = 5.9e-3 * 0.12 * 120.0 * 2376.0  # motor torque per error of the output of the first
 FIN = 1.0 / 60.0 + 1.7e-3  # motor torque per torque on the fin: what passes, and 10 % of it lost
+P_LOOPS = {"current": {"gain_V_A": 0.05, "integral_time_s": None}, "velocity": {"integral_time_s": None}}
 KICKS = {
     "feedforward": 1.0, "acceleration_feedforward": 1.0, "derivative_time": 1e-3, "friction_feedforward": 2.0,
 }  # fmt: skip
@@ -107,6 +113,38 @@ def test_what_a_reversal_loses_is_predicted(name, load_Nm, expected, within):
     assert loop.lost_motion_rad == pytest.approx(loop.predicted_rad, rel=within, abs=rounding)
 
 
+@pytest.mark.parametrize(("design", "T", "U"), [
+    *((with_values(AMBER, {"control.velocity.integral_time": T}), T, math.inf) for T in (0.5, 4.0, 1e3)),
+    *((extruder(U, T), T, U) for T, U in ((10.0, 100.0), (10.0, 0.4))),
+    (with_values(JOINT, {"control.position.integral_time": 30.0}), math.inf, 30.0),
+])  # fmt: skip
+def test_what_a_slow_integral_leaves_of_a_reversal(design: model.Design, T: float, U: float) -> None:
+    """Of one or two, however slow beside the triangle; the loop's own lag moves the passage by about 1/Kv."""
+    static, slow = threshold(design := quiet(design), 0.0).static, assemble_loops(design)
+    loop = hysteresis(design, 0.0, static, linear_steady_state(slow, np.array([1.0])).settling_ticks)
+    within = 3.0 / design.controller.position.gain / min(T, U)
+    assert loop.lost_motion_rad == pytest.approx(loop.predicted_rad, rel=within)
+
+
+@pytest.mark.parametrize("T", [1.0, 10.0, 100.0, 1e4])
+def test_an_orbit_of_short_stands_has_a_closed_form(T: float) -> None:
+    """e + z/T = F + g t turns over at once: F/cosh(P/4T) + g T (1 - 1/cosh(P/4T))."""
+    F, g, P = 2.0, 3e-3, 40.0
+    fast = Orbit(F, F, g, 1e8, 0.5 * P, np.array([1.0 / T, 0.0]))
+    left = 1.0 / math.cosh(0.25 * P / T)
+    assert fast.at_zero_rad == pytest.approx(F * left + g * T * (1.0 - left), rel=1e-6)
+    alone = replace(fast, gains=np.zeros(2), rate_rad_s=1.0, breakaway_rad=2.5, growth_rad_s=0.0)
+    assert alone._stand_s() == pytest.approx(F + 2.5, rel=1e-12)
+    assert alone.at_zero_rad == pytest.approx(F, rel=1e-12)
+    assert replace(alone, rate_rad_s=0.1).at_zero_rad == 0.0  # the command turns before it breaks away
+
+
+def test_a_width_is_that_of_the_periodic_state() -> None:
+    passing = np.array([(-1.0) ** k * 0.35 + 0.2 * 0.8**k for k in range(3)])
+    assert _width(passing) == pytest.approx(0.7, rel=1e-12)
+    assert _width(np.array([1.5, 0.5, 1.5])) == 1.0  # about a middle
+
+
 def test_the_error_that_stays_of_a_force_source_is_less_than_its_threshold() -> None:
     """And the largest one is what the section says, though a smaller step leaves a larger share of itself."""
     static, result = static_threshold(EMPS), friction_effects(EMPS)
@@ -180,6 +218,35 @@ def test_stick_slip_needs_breakaway_above_friction_and_an_integral() -> None:
         assert point.cycles.as_predicted
     emps = with_values(EMPS, {"friction.breakaway_ratio": 2.0})
     assert friction_effects(emps).points[0].cycles.stick_slip is None
+
+
+def test_a_p_current_loop_gives_a_part_of_its_command_and_overshoots_it() -> None:
+    """i ends at Kp/(Kp + R) of the command, after Kp/R (1 - exp(-2 R T/L)): it is seen two ticks later."""
+    slow = changed(AMBER, controller={"current": P_LOOPS["current"]})
+    sticky = quiet(
+        changed(slow, controller={"velocity": {"integral_time_s": 0.05}}, friction={"breakaway_ratio": 1.6})
+    )
+    cycle = stick_slip_cycle(sticky, 5.0)
+    swing = settle(sticky, 5.0, cycle.output_amplitude_rad)
+    assert swing.rest.frequency_hz == pytest.approx(cycle.frequency_hz, rel=2e-3)
+    assert swing.swing_rad == pytest.approx(cycle.output_amplitude_rad, rel=2e-3)
+    stiff = quiet(changed(AMBER, controller=P_LOOPS))
+    R, L, T = 0.055, 6e-6, stiff.controller.period_s
+    first = 0.05 / R * -math.expm1(-2.0 * R * T / L)
+    result = threshold(stiff, 5.0)
+    assert result.static.forward_rad == pytest.approx(8.95e-3 / STIFFNESS * (0.05 + R) / 0.05)
+    assert result.simulated_rad == pytest.approx(8.95e-3 / STIFFNESS / first, rel=2.0 * result.resolution)
+
+
+@pytest.mark.parametrize("design", [EMPS, changed(AMBER, controller=P_LOOPS)])
+def test_a_feed_forward_of_friction_takes_its_part_of_what_a_reversal_loses(design: model.Design) -> None:
+    """Found, against the drive without either, as predicted: of a P current loop the part that it gives."""
+    fed = changed(design, controller={"position": {"friction_feedforward": 0.3}})
+    for point, plain in zip(friction_effects(fed).points, friction_effects(design).points, strict=True):
+        lost, without = point.hysteresis, plain.hysteresis
+        assert lost.lost_motion_rad == pytest.approx(lost.predicted_rad, rel=1e-6)
+        assert lost.predicted_rad < 0.95 * without.predicted_rad
+        assert lost.linear_width_rad == pytest.approx(without.linear_width_rad, rel=1e-9)
 
 
 def test_a_stick_slip_cycle_is_not_foreseen_where_a_filter_holds_what_is_not_known() -> None:
