@@ -14,10 +14,10 @@ from actuator_lti.types import Floats, Progress
 from analyses.correlation import driving
 from analyses.correlation.between_ticks import likeliest_s, signals_at
 from analyses.correlation.compare import SignalComparison, compare_signals
-from analyses.correlation.following import followed, following_finding
+from analyses.correlation.following import Followed, followed, following_finding
 from analyses.records.consistency import Finding, because, check_record
 from analyses.records.differentiation import filtered_motion
-from analyses.records.inputs import InputUse, account
+from analyses.records.inputs import InputUse, account, lacking
 from analyses.records.naming import KNOWN_UNITS, LOADS
 from analyses.records.record import Record, period_of, prepared
 from nonlinear import State, Trajectory, commands, simulate
@@ -85,11 +85,11 @@ def correlate_record(
     measured.pop(command or "", None)
     if not measured:
         known = ", ".join(AXIS_SIGNALS[design.axis])
-        raise InputError(f"nothing to compare; known signals: {known}", where=record.name)
+        raise lacking(record, f"nothing to compare; known signals: {known}")
     with because({record.name: findings}):
         driven, run, series = nearest_run(design, record, measured, progress, command)
     modelled = {name: series[name] for name in measured}
-    if (follows := followed(design, record, modelled, command)) is not None:
+    if (follows := with_zero(design, record, followed(design, record, modelled, command))) is not None:
         findings += (following_finding(design, follows),)
     outermost = driven.stage == design.controller.outermost
     used = dict.fromkeys(measured, "compared") | {LOADS[design.axis]: "load", "enable": "enabled part"}
@@ -147,6 +147,24 @@ def model_signals(design: Design, record: Record, measured: Mapping[str, Floats]
     """
     series = nearest_run(design, record, measured)[2]
     return {name: series[name] for name in measured}
+
+
+def with_zero(design: Design, record: Record, one: Followed | None) -> Followed | None:
+    """How a record fails to follow, with the zero of its position where that is most of it.
+
+    The position is moved to where the loops hold it, and the drive simulated from there.
+    """
+    if one is None or not one.fails or one.stage != "position":
+        return one
+
+    def left(record: Record) -> Floats:
+        model = model_signals(design, record, measured_signals(design, record))[one.place]
+        return record[one.place][: len(model)] - model
+
+    before = left(record)
+    zero = float(np.median(before))
+    after = left(replace(record, signals={**record.signals, one.place: record[one.place] - zero}))
+    return replace(one, zero=zero) if 2.0 * float(after @ after) < float(before @ before) else one
 
 
 def as_driven(design: Design, record: Record) -> Record:

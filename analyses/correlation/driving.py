@@ -15,6 +15,7 @@ from actuator_lti.drive.steady import steady_voltage_V
 from actuator_lti.errors import InputError
 from actuator_lti.types import Floats, Ints
 from analyses.records.holds import Hold, hold_of
+from analyses.records.inputs import lacking
 from analyses.records.naming import LOADS
 from analyses.records.record import HELD, SMOOTH, STRAIGHT, Record
 from nonlinear import State, commands, loads
@@ -145,7 +146,7 @@ def needed_command(design: Design, record: Record, signal: str | None = None) ->
         first, *others = command_names(design)
         more = f" (or {', '.join(others)})" if others else ""
         message = f'no command: the signal "{first}" is needed for a {design.axis} axis{more}'
-        raise InputError(message, where=record.name)
+        raise lacking(record, message)
     return driven
 
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.signal import lfilter
 
+from actuator_lti.design.control import FEED_FORWARD
 from actuator_lti.design.model import Design
 from actuator_lti.types import Floats
 from analyses.correlation.driving import Driven, command_of
@@ -26,6 +27,9 @@ class Followed:
     clock: float  # of the following error, recorded over simulated
     off: float = 0.0  # of what the position has too much of the motion
     limit: str = ""  # the largest current, where the loops take far more of it for the same command
+    place: str = ""  # the signal that it is of
+    lags: bool = True  # the simulated following error makes its speed, whatever the drive's torque
+    zero: float = 0.0  # of the place from that of its command, rad (m), where that is most of what is off
 
     @property
     def fails(self) -> bool:
@@ -35,6 +39,10 @@ class Followed:
     @property
     def words(self) -> str:
         """What is off, by how much, and by what."""
+        if self.zero:
+            unit = "m" if self.place == "position" else "rad"
+            told = f"the zero of the {self.place} is {self.zero:.4g} {unit} from that of its command"
+            return f"{told}: offset of its column in a record file"
         if self.alike < ALIKE:
             return f"the motion is not that of the command (correlation {self.alike:.2f})"
         scale = "counts a revolution, the reduction, or a unit"
@@ -45,8 +53,8 @@ class Followed:
             cause = scale
         elif self.stage == "position":
             what, of = "following error", "of the design's loops at this motion"
-            clock = f"a clock about {100.0 * self.clock:+.2g} % off"
-            cause = f"{clock}, a command logged early or late, {self.limit or 'or another gain'}"
+            clock = f"a clock about {100.0 * self.clock:+.2g} % off, " * (ratio > 0.0)
+            cause = f"{clock}a command logged early or late, {self.limit or 'or another gain'}"
         return f"the {what} is {ratio:.4g} times that {of}: {cause}"
 
 
@@ -84,7 +92,12 @@ def followed(
     shares, errors = solved.values / size, np.sqrt(np.diag(solved.correlated)) / size
     _, alike = ratio_of(own - own.mean(), model - model.mean())
     clock, *off = np.where(np.abs(shares) > SURE * errors, shares, 0.0).tolist()
-    return Followed(driven.stage, alike, clock, sum(off), _limit(record.signals, simulated))
+    limit, lags = _limit(record.signals, simulated), True
+    position, error = control.position, _following_error(driven, place, model)
+    if error is not None and position is not None and any(getattr(position, name) for name in FEED_FORWARD):
+        fed = position.feedforward * np.gradient(error + model)
+        lags = ratio_of(error - error.mean(), np.gradient(model) - fed)[1] >= ALIKE
+    return Followed(driven.stage, alike, clock, sum(off), limit, place, lags)
 
 
 def _limit(recorded: Mapping[str, Floats], simulated: Mapping[str, Floats]) -> str:
@@ -101,24 +114,35 @@ def moved_by_clock(driven: Driven, record: Record, place: str, model: Floats) ->
 
     ``place``: the signal that ``model`` is of. None where that is no place, or no position is commanded.
     """
+    position, error = driven.design.controller.position, _following_error(driven, place, model)
+    if error is None or position is None:
+        return None
+    lag = position.gain * record.period_s
+    return np.asarray(-lfilter([-np.expm1(-lag)], [1.0, -np.exp(-lag)], error))
+
+
+def _following_error(driven: Driven, place: str, model: Floats) -> Floats | None:
+    """Command less a simulated motion; None where that is no place, or no position is commanded."""
     control = driven.design.controller
     if place not in PLACES or driven.stage != "position" or control.velocity is None or not control.position:
         return None
     factor = driven.design.total_ratio if place == "angle" else 1.0
-    lag = control.position.gain * record.period_s
-    error = factor * driven.values[: len(model)] - model
-    return np.asarray(-lfilter([-np.expm1(-lag)], [1.0, -np.exp(-lag)], error))
+    return factor * driven.values[: len(model)] - model
 
 
 def following_finding(design: Design, one: Followed) -> Finding:
     """The same of a design as it is; not determined where the motion is another, which its error tells.
 
-    A speed loop without an integral leaves an error that the design's friction makes: no proof of a clock.
+    A speed loop without an integral leaves an error that the design's friction makes, and what is fed forward
+    one that all its torques make: no proof of a clock.
     """
     loop, subject = design.controller.velocity, "following error against that of the design's loops"
+    if one.zero:
+        return Finding(subject, False, one.words)
     if one.alike < ALIKE:
         return Finding(subject, None, one.words)
     if not one.fails:
         largest = 100.0 * max(abs(one.clock), abs(one.off))
         return Finding(subject, True, f"within {largest:.2g} %" if largest else "they agree but for chance")
-    return Finding(subject, None if loop is None or loop.integral_time_s is None else False, one.words)
+    proof = (one.lags or one.limit) and loop is not None and loop.integral_time_s is not None
+    return Finding(subject, False if proof else None, one.words)

@@ -15,6 +15,7 @@ from analyses.estimation.parameters import parameter
 from analyses.identification.joint_model import JointModel, Recipe
 from analyses.identification.rows import motion_of, recipe_for, stands
 from analyses.records.differentiation import central_difference
+from analyses.records.inputs import lacking
 from analyses.records.record import Record, period_of
 
 NAMES = ("resistance", "back_emf", "inductance", "voltage_offset")
@@ -164,7 +165,7 @@ def _rows(design: Design, record: Record, recipe: Recipe | None, late_s: float) 
     """Columns i, w, di/dt, 1 and u of one record, filtered alike; u as it acts, ``late_s`` later."""
     for name in ("voltage", "current"):
         if name not in record.signals or not record[name] @ record[name] > 0.0:
-            raise InputError(f"no {name}: voltage, current and motion are needed", record.name)
+            raise lacking(record, f"no {name}: voltage, current and motion are needed")
     recipe, period = recipe or recipe_for(record), period_of(record)
     speed = motion_of(record.drive(design), record, recipe)[0].velocity
     if stands(design, record, recipe):  # as a regressor its noise would make kE about 0

@@ -1,6 +1,6 @@
 """The rows of the regression that one record gives: motion, drive torque, load, rest left out."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -27,6 +27,8 @@ from analyses.identification.load_side import two_sides
 from analyses.identification.sampled_current import held_s, mean_current
 from analyses.records.consistency import NO_CHANCE, place_of
 from analyses.records.differentiation import Motion, decimated
+from analyses.records.driven_motion import ratio_of
+from analyses.records.inputs import lacking
 from analyses.records.naming import LOADS, RATES
 from analyses.records.record import Record, lasting, period_of, prepared
 
@@ -85,8 +87,8 @@ def drive_of(design: Design, record: Record) -> tuple[Floats, str, str, bool]:
         if name in signals and constant is not None and ohm is not None:
             told = f"kM (u - kE w)/R of the {words}, without the inductance"
             return np.asarray(constant / ohm * record[name]), name, told, True
-    told = "no drive signal: force, current (with kM), torque or voltage (with a source gain, or kM and R)"
-    raise InputError(told, where=record.name)
+    told = "no drive signal: force, current (kM), torque_reference, or voltage (a source gain, or kM and R)"
+    raise lacking(record, told)
 
 
 def motion_of(design: Design, record: Record, recipe: Recipe) -> tuple[Motion, str]:
@@ -97,7 +99,7 @@ def motion_of(design: Design, record: Record, recipe: Recipe) -> tuple[Motion, s
     rate = RATES[design.axis]
     if rate not in record.signals:
         wanted = "position or velocity" if design.axis == "linear" else "angle, output_angle or speed"
-        raise InputError(f"no motion: {wanted} is needed", where=record.name)
+        raise lacking(record, f"no motion: {wanted} is needed")
     made = recipe.motion(record[rate], period)
     whole = np.concatenate([[0.0], np.cumsum(made.position[:-1] * period)])
     return Motion(position=whole, velocity=made.position, acceleration=made.velocity), rate
@@ -111,7 +113,11 @@ def stands(design: Design, record: Record, recipe: Recipe | None = None) -> bool
     values = record[rate] if place is None else place[1] - place[1][0]  # exactly zero of a constant angle
     values = values if place is None else values - values.mean()
     recipe = recipe or recipe_for(record)
-    return is_white(values, record, recipe) or _is_unmoved(design, record, recipe)
+    own, before = values[1:], values[:-1]  # of noise behind a filter of first order the innovations are white
+    innovations = own - ratio_of(own, before)[0] * before
+    return is_white(values, record, recipe) or (
+        is_white(innovations, record, recipe) and _is_unmoved(design, record, recipe)
+    )
 
 
 def is_white(values: Floats, record: Record, recipe: Recipe) -> bool:
@@ -131,8 +137,8 @@ def is_white(values: Floats, record: Record, recipe: Recipe) -> bool:
 def _is_unmoved(design: Design, record: Record, recipe: Recipe) -> bool:
     """Whether a drive that is more than noise moves nothing: its torque has no inertia and no friction.
 
-    By Wald's test of all three, with the correlation in time of what they leave. Noise of a speed behind a
-    filter is not white, but no torque goes into it.
+    By Wald's test of all three, with the correlation in time of what they leave: a load that is not known,
+    of which that is full, may hide the torque of a motion as well.
     """
     try:
         drive = drive_of(design, record)[0]
@@ -302,6 +308,18 @@ def _torque(design: Design, record: Record, motion: Motion, recipe: Recipe) -> t
         back = constant if motor.back_emf_constant_Vs_rad is None else motor.back_emf_constant_Vs_rad
         drive = drive - constant * back / motor.resistance_ohm * motion.velocity
     return drive, driven_by, told
+
+
+def driven_rows(design: Design, record: Record, rows: Rows) -> Callable[[Record], Floats]:
+    """The drive torque at the rows of a record, of others that differ from it in the drive signal alone."""
+    design, recipe = record.drive(design), rows.recipe
+    motion = _balance(design, prepared(record), recipe, gravity=False).motion
+
+    def driven(other: Record) -> Floats:
+        drive = _torque(design, prepared(other), motion, recipe)[0]
+        return decimated(drive[recipe.part(len(drive))], recipe.decimation)[rows.keep]
+
+    return driven
 
 
 def rows_under(design: Design, record: Record, model: JointModel) -> Rows:

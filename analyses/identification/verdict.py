@@ -105,10 +105,10 @@ def residual_item(residual: float, limit: float) -> Item:
     return share_item("residual", "Relative residual of the fit", residual, limit, why)
 
 
-def law_items(bend: Bend | None, model: JointModel, axis: str, commanded: bool = True) -> Iterator[Item]:
+def law_items(bend: Bend | None, model: JointModel, axis: str, feigned: str = "") -> Iterator[Item]:
     """Whether the residual asks for another friction law; beside a map the intervals hold it.
 
-    Reversals that are not simulated with their command may feign a bend.
+    ``feigned``: what may feign a bend.
     """
     if bend is None:
         return
@@ -118,8 +118,8 @@ def law_items(bend: Bend | None, model: JointModel, axis: str, commanded: bool =
     if np.isinf(bend.speed_rad_s):
         told, cure = f"its slope differs by direction {sure}", "--friction per-direction finds it"
     passed, why = (None, "the intervals hold it") if model.knots_rad_s else (False, cure)
-    if not commanded:
-        passed, why = None, f"{why}, or reversals feign it, which no command tells"
+    if feigned:
+        passed, why = None, f"{why}, or {feigned}"
     label, reason = "Friction law of the fit is that of the records", f"{told}: {why}"
     if not bend.is_sure:
         passed, reason = True, ""
@@ -160,9 +160,16 @@ def made_items(unmade: str, before: Design, made: Design) -> Iterator[Item]:
         yield Item.unproven("map", "Friction map of the design", why)
 
 
-def lag_items(late_s: float, period_s: float) -> Iterator[Item]:
+def feigned_law(*, late: bool, reversals: bool) -> str:
+    """What may feign another friction law; empty where nothing does."""
+    if late:
+        return "a filter feigns it, where current and motion are not at one time"
+    return "reversals feign it, which no command tells" if reversals else ""
+
+
+def lag_items(late_s: float, late: bool) -> Iterator[Item]:
     """A current that is, or may be, later than the motion by more than a sample."""
-    if late_s > period_s:
+    if late:
         told = f"{1e3 * late_s:.2g} ms off, or not told closer: what is sure is taken back as a delay"
         why = f"{told}, assumed no filter; inertia and friction hang on it"
         yield Item.unproven("lag", "Current and motion at one time", why)
@@ -246,6 +253,6 @@ def following_item(record: str, followed: Followed) -> Item:
     """Whether the record follows its command as the design's loops do at this motion."""
     label = f"{record}: the command is followed as by the design's loops"
     id = f"following-{record}"
-    if followed.alike < ALIKE:
+    if followed.zero or followed.alike < ALIKE:
         return Item.of(id, label, followed.words)
     return share_item(id, label, max(abs(followed.clock), abs(followed.off)), RATE_TOLERANCE, followed.words)

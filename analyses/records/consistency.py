@@ -18,7 +18,7 @@ from analyses.estimation.parameters import own_share
 from analyses.records.differentiation import butterworth
 from analyses.records.driven_motion import ALIKE, ratio_of, turned_current, wrong_time, wrong_time_of_speed
 from analyses.records.factors import explaining, named_factor, with_factor
-from analyses.records.naming import RATES
+from analyses.records.naming import LOADS, RATES
 from analyses.records.record import DISORDER, HELD, Record
 from analyses.records.single_rows import NORMAL, impossible_steps, named_rows, noise_bound
 
@@ -95,7 +95,7 @@ def check_record(design: Design, record: Record) -> tuple[Finding, ...]:
     design, as_read = record.drive(design), record.as_read or record
     ratio = rate_ratio(design, record)
     rate, electrical = partial(_rate, ratio), partial(_electrical, abs(_doubt(design, record, ratio)))
-    checks = (rate, _still, _time, _clock, _reduction, electrical, _sign, _command, _supply)
+    checks = (rate, _still, _time, _clock, _reduction, electrical, _sign, _load, _command, _supply)
     steps = _steps(design, record)  # a row that is lost at full speed looks like a jump
     steps = steps if steps and steps.passed is False else _jumps(design, as_read) or steps
     found = (_rows(as_read), steps, *(check(design, record) for check in checks), *_limits(design, as_read))
@@ -304,6 +304,10 @@ def _jumps(design: Design, record: Record) -> Finding | None:
     jumps, few = named_rows(record, rows, place[0], unit, jumps=True), len(rows) <= FEW_ROWS * len(record)
     most = f"more than the speed limit, {reachable_speed(design):.4g} {unit}/s at the motor, allows"
     told = BAD_ROW if few else "is the unit of the position or of the time right?"
+    turn = 2.0 * np.pi * (design.total_ratio if place[0] == "output_angle" else 1.0)
+    off = np.abs(np.abs(np.diff(place[1])) - turn)[rows - 1]
+    if design.axis == "rotary" and np.all(off <= rate * np.diff(record.time_s)[rows - 1]):
+        told = "it begins anew with each turn: count the turns on (numpy.unwrap)"
     told = f"the {place[0]} jumps {jumps}: {most} in that time: {told}"
     return Finding(f"steps of the {place[0]} from row to row", False, told)
 
@@ -497,6 +501,25 @@ def _counted(
             f": a winding {kelvin:+.0f} K from the design's, or a current {1.0 / ratio:.3g} times the real"
         )
     return (None if warm else False), with_factor(text, 1.0 / ratio if ratio > 0.0 else 0.0)
+
+
+def _load(design: Design, record: Record) -> Finding | None:
+    """A recorded load that goes with the current as its own torque: what the drive moves is against it."""
+    name, constant = LOADS[design.axis], design.effective_motor.torque_constant_Nm_A
+    if not {name, "current"} <= record.signals.keys() or not constant or not np.ptp(record[name]):
+        return None
+    load, torque = (_smooth(record, values) for values in (record[name], constant * record["current"]))
+    for ratio in {1.0, design.total_ratio}:
+        share, alike = ratio_of(load, ratio * torque)
+        if alike > ALIKE and abs(share - 1.0) <= SURE * own_share(design, "motor.torque_constant"):
+            words = "kM i" if ratio == 1.0 else "kM i and the reduction"
+            told = (
+                f"the {name} is {share:.4g} times {words}: the drive's own (leave the column out), or a load "
+            )
+            return Finding(
+                "load against the current", False, f"{told}of turned sign: positive drives forward"
+            )
+    return None
 
 
 def _command(design: Design, record: Record) -> Finding | None:

@@ -5,6 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from actuator_lti.errors import InputError
+from actuator_lti.files.reading import shown
 from analyses.records.naming import MEANINGS, NOT_NEEDED, is_time, signal_of, taken_apart
 from analyses.records.record import InputColumn, Record
 from analyses.records.spec import CsvFormat, RecordSpec, SignalColumn, TimeColumn
@@ -49,6 +51,15 @@ def _use(record: Record, one: InputColumn, used: Mapping[str, str]) -> InputUse:
         return InputUse(column=one.column, unit=unit, use=why)
     low, high = float(np.min(values)), float(np.max(values))
     return InputUse(column=one.column, meaning=meaning, unit=unit, low=low, high=high, si=si, use=use + note)
+
+
+def lacking(record: Record, told: str) -> InputError:
+    """What a record lacks, and which columns of its file were not read, and why."""
+    left = "; ".join(f"{shown(one.column)}: {one.note}" for one in record.inputs if not one.signal)
+    told += f"; of its columns were not read, unless a record file (TOML) says what they are: {left}" * bool(
+        left
+    )
+    return InputError(told, where=record.name)
 
 
 def inputs_of(spec: RecordSpec, columns: Sequence[str]) -> tuple[InputColumn, ...]:

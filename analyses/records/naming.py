@@ -66,9 +66,9 @@ NOT_NEEDED = {"motor_angle": "m", "motor_position": "m"}
 
 SUFFIXES = {
     "rad": "rad", "deg": "deg", "rev": "rev", "turn": "turn", "m": "m", "mm": "mm", "um": "um",
-    "A": "A", "mA": "mA", "V": "V", "mV": "mV", "N": "N", "kN": "kN", "Nm": "N*m", "mNm": "mN*m",
-    "rad_s": "rad/s", "deg_s": "deg/s", "rpm": "rpm", "rev_s": "rev/s", "m_s": "m/s", "mm_s": "mm/s",
-    "s": "s", "ms": "ms", "us": "us",
+    "A": "A", "mA": "mA", "Arms": "Arms", "V": "V", "mV": "mV", "N": "N", "kN": "kN", "Nm": "N*m",
+    "mNm": "mN*m", "rad_s": "rad/s", "deg_s": "deg/s", "rpm": "rpm", "krpm": "krpm", "rev_s": "rev/s",
+    "m_s": "m/s", "mm_s": "mm/s", "s": "s", "ms": "ms", "us": "us",
 }  # fmt: skip
 _BRACKETS = re.compile(r"^(?P<base>.*?)\s*[\[({](?P<unit>[^\])}]*)[\])}]\s*$")
 _SLASH = re.compile(r"^(?P<base>[^/]*[^/\s])\s*/\s*(?P<unit>\S.*)$")
@@ -85,12 +85,14 @@ class ColumnName:
 
 
 def taken_apart(column: str) -> ColumnName:
-    """Words and unit of a column name.
+    """Words and unit of a column name; a signal without a unit needs none in its name.
 
     >>> taken_apart("Motor speed [rpm]").base, taken_apart("Motor speed [rpm]").unit
     ('motor_speed', 'rpm')
     >>> taken_apart("t/ms").unit, taken_apart("current_A").unit, taken_apart("Irms (A)").rms
     ('ms', 'A', True)
+    >>> taken_apart("current_Arms").rms, taken_apart("speed_krpm").unit, taken_apart("enable").unit
+    (True, 'krpm', '1')
     """
     for pattern in (_BRACKETS, _IN, _SLASH):
         match = pattern.match(column.strip())
@@ -125,6 +127,7 @@ def _words(base: str, unit: str | None) -> ColumnName:
     if words and words[-1] not in ("rms", "eff") and words[-1].endswith("rms"):
         rms, words[-1] = True, words[-1].removesuffix("rms")
     name = "_".join(word for word in words if word not in ("rms", "eff", "", "actual", "measured"))
+    unit = "1" if unit is None and signal_of(name, "1") is not None else unit
     return ColumnName(name, None if unit is None else spelled(unit), rms)
 
 

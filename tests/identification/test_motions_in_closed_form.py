@@ -202,6 +202,16 @@ def test_noise_behind_a_filter_is_no_motion(corner_hz: float, moves: float) -> N
     assert stands(design, record_of(time, velocity=logged, force=force)) is (moves == 0.0)
 
 
+@pytest.mark.parametrize("place", ["velocity", "position"])
+def test_a_motion_under_a_load_that_is_not_known_is_one(place: str) -> None:
+    """30 times what the drive takes, as gravity or a load of turned sign leave: that may be zero then."""
+    time, way, speed, acceleration = _sines(np.random.default_rng(0), 4000)
+    own = MASS * acceleration + VISCOUS * speed + DRY * np.sign(speed)
+    force = own + 30.0 * np.std(own) * np.sin(0.7 * time)
+    record = record_of(time, **{place: {"velocity": speed, "position": way}[place]}, force=force)
+    assert not stands(load_design("emps"), record)
+
+
 def test_a_slope_that_came_out_negative_and_is_kept_is_no_proof_of_the_law() -> None:
     """Friction that falls with the speed, as `JointModel` has it where a command is simulated: 0 errors."""
     rng = np.random.default_rng(3)

@@ -7,12 +7,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
 from actuator_lti.design import load_design, parameter_value, with_values, write_design
 from analyses.correlation.asked import Asked
 from analyses.correlation.closed_loop import correlate_record
 from analyses.correlation.compare import compare_signals
 from analyses.correlation.run import Correlation
+from analyses.identification.bench import identify_bench
 from analyses.identification.to_design import inertia_share
 from analyses.identification.verdict import sampling_items
 from analyses.records.consistency import check_record
@@ -20,7 +22,16 @@ from analyses.records.open_record import open_record
 from analyses.records.record import Record, prepared
 from nonlinear import commands, simulate
 from tests.changed import changed
-from tests.identification.bench_records import Columns, bare, columns_of, motion, record_of, signals_of, write
+from tests.identification.bench_records import (
+    Columns,
+    bare,
+    columns_of,
+    item_of,
+    motion,
+    record_of,
+    signals_of,
+    write,
+)
 from tests.refusals import refused
 
 DRIVE = load_design("ilr33-amber")
@@ -144,6 +155,54 @@ def test_the_sign_of_a_current_is_told_without_a_voltage(sign, signals, columns:
     told = [one.text for one in check_record(other, record) if one.subject == "current against the motion"]
     assert bool(told) is (sign < 0.0)
     assert not told or "the sign of the current is turned" in told[0]
+
+
+@pytest.mark.parametrize(("fault", "words"), [
+    ("zero", r"the zero of the angle is 60 rad from that of its command"),
+    ("round", r"it begins anew with each turn: count the turns on"),
+    ("own torque", r"the torque is 1 times kM i: the drive's own \(leave the column out\)"),
+])  # fmt: skip
+def test_what_benches_do_to_a_column_is_named(fault: str, words: str, columns: Columns) -> None:
+    """An encoder that was zero elsewhere, or counts one turn; a drive's log of its own torque."""
+    angle, torque = columns["angle"], DRIVE.effective_motor.torque_constant_Nm_A * columns["current"]
+    changed = {"zero": {"angle": angle + 60.0}, "round": {"angle": angle % (2.0 * np.pi)}}.get(fault)
+    record = _record(columns, "reference", "angle", "current", **(changed or {}))
+    if changed is None:
+        record = record_of(record.time_s, **record.signals, torque=torque)
+    assert re.search(words, _correlated(record)[1])
+
+
+def test_a_following_error_that_torques_make_tells_no_clock() -> None:
+    """The command's speed is fed forward; friction and inertia are not the design's."""
+    design = with_values(DRIVE, {"control.position.feedforward": 1.0})
+    other = {"friction.dry_torque": 1.5 * DRIVE.friction.dry_torque_Nm, "motor.rotor_inertia": 2.5e-6}
+    columns = signals_of(motion(2, design=with_values(design, other)), 1)
+    record = _record(columns, "reference", "angle", "current")
+    (told,) = (
+        one for one in correlate_record(design, record).findings if one.subject.startswith("following")
+    )
+    assert told.passed is None
+
+
+def test_a_filter_of_the_speed_is_no_other_friction_law(columns: Columns) -> None:
+    """First order, 4 ms; it is taken back as a delay, which leaves a bend around the reversals."""
+    late = lfilter([0.2], [1.0, -0.8], columns["speed"])
+    record = _record(columns, "reference", "speed", "current", speed=late)
+    result = identify_bench(DRIVE, [record])
+    assert item_of(result, "law").passed is None
+    assert "a filter feigns it" in item_of(result, "law").reason
+    assert result.passed
+
+
+@pytest.mark.parametrize(("column", "why"), [
+    ("motor_position_counts", "no name that is known"),
+    ("motor angle [inc]", "no name and unit that are known together"),
+    ("angle", "has no unit in its name"),
+])  # fmt: skip
+def test_a_column_that_is_not_read_is_named_where_it_lacks(column, why, columns, tmp_path, cli) -> None:
+    named = {"time_s": columns["time"], column: columns["angle"], "current_A": columns["current"]}
+    said = cli.refused("identify", write(tmp_path / "a.csv", named), "--design", "ilr33-amber")
+    assert f'"{column}": {why}' in said
 
 
 def test_a_signal_whose_squares_are_zero_is_zero(columns: Columns) -> None:
