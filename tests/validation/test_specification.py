@@ -91,6 +91,17 @@ def test_a_sine_within_the_limits_needs_the_current_of_its_friction(amber: Speci
     assert move.rms_current_A == pytest.approx(by_hand, rel=0.01)
 
 
+def test_the_peak_rate_of_a_load_behind_a_spring_is_its_own() -> None:
+    """The load of the fin leaves its play a third faster than the motor turns."""
+    step = specification(FIN).steps[-1]
+    run = simulate(FIN, commands.step(step.amplitude_rad), 0.3, step.load_Nm)
+    rates = [
+        np.abs(np.diff(y)).max() / run.period_s for y in (run.output_angle_rad, run.motor_angle_rad / 60.0)
+    ]
+    assert step.peak_rate_rad_s == pytest.approx(rates[0], rel=0.01)
+    assert rates[0] > 1.3 * rates[1]
+
+
 def test_step_times(amber: Specification) -> None:
     """A small step takes the linear time; a large one the rate limit: 0.8 A/R from 10 to 90 %."""
     for load in (0.0, 8.0):
