@@ -126,10 +126,10 @@ def _made(design: Design, asked: Asked) -> Iterator[tuple[str, str, Design]]:
     if electric:
         yield "hot", f"winding and magnets at {asked.hot_degC:g} °C", hot
     if electric or thick:
-        words = [f"winding and magnets at {asked.cold_degC:g} °C"] * electric
-        words += [f"viscous friction times {asked.cold_viscous:g}"] * thick
+        colder = [f"winding and magnets at {asked.cold_degC:g} °C"] * electric
+        colder += [f"viscous friction times {asked.cold_viscous:g}"] * thick
         cold = at_temperature(design, asked.cold_degC) if electric else design
-        yield "cold", ", ".join(words), _thickened(cold, asked.cold_viscous)
+        yield "cold", ", ".join(colder), _thickened(cold, asked.cold_viscous)
     yield named, supply, low
     if electric:
         both = replace(hot, limits=low.limits)
