@@ -118,7 +118,7 @@ def _followed(start: Design, record: Record, simulated: Mapping[str, Floats]) ->
     if one is not None and one.alike < ALIKE:
         simulated = with_model_signals(start, simulated_part(start, record)).signals
         one = followed(start, record, simulated)
-    return with_zero(start, record, one)
+    return with_zero(start, simulated_part(start, record), one)
 
 
 def _with_doubts(

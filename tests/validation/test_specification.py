@@ -163,6 +163,21 @@ def test_a_hunting_drive_fails_its_verdict() -> None:
     assert any(item["verdict"] == Verdict.NOT_MET and "refuted" in item["reason"] for item in items)
 
 
+def test_a_p_current_loop_bounds_the_plane_where_the_drive_has_its_top_speed() -> None:
+    """(Kp + R) i = Kp i_peak - kE w: there steady motion takes all of it."""
+    slow = {"current": {"gain_V_A": 0.05, "integral_time_s": None}}
+    design = changed(AMBER, controller=slow, limits={"speed_rad_s": 2e3}, validation={"loads_Nm": (1.0,)})
+    found, motor = drive_figures(design, 1.0), design.effective_motor
+    top = found.output_rate_rad_s * design.total_ratio
+    plane = torque_speed_plane(design, top)
+    (bound,) = (curve for curve in plane.bounds if curve.name == "peak current")
+    R, kM = motor.resistance_ohm, motor.torque_constant_Nm_A
+    peak = design.limits.peak_current_A
+    assert bound.torque_Nm[0] == pytest.approx(kM * 0.05 * peak / (0.05 + R))
+    there, taken = (np.interp(top, one.speed_rad_s, one.torque_Nm) for one in (bound, plane.demands[0]))
+    assert there == pytest.approx(taken, rel=1e-9)
+
+
 @pytest.mark.parametrize("name", UNDER_LOAD)
 def test_the_demand_of_the_plane_is_what_steady_motion_takes(name: str) -> None:
     """Friction behind the coupling and damping of the load too: the torque of a ramp, simulated."""
