@@ -6,7 +6,6 @@ holds is rounded well above. Two results on either side of a rounding border sti
 about a million, which no rounding can help.
 """
 
-from collections.abc import Mapping
 from typing import Any
 
 DIGITS = 8
@@ -31,7 +30,7 @@ def certain(value: Any, name: str = "") -> Any:
     """
     if isinstance(value, float):
         return _number(value, name.lower())
-    if isinstance(value, Mapping):
+    if isinstance(value, dict):
         if value.get("kind") == "table":
             units = {column["key"]: column["unit"] for column in value["columns"]}
             names = {key: f"{key} {units.get(key, '')}".strip() for row in value["rows"] for key in row}

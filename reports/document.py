@@ -287,7 +287,7 @@ def _seen(value: Any) -> Any:
     """Make every text of plain data visible, keys included."""
     if isinstance(value, str):
         return visible(value)
-    if isinstance(value, Mapping):
+    if isinstance(value, dict):
         return {visible(key): _seen(item) for key, item in value.items()}
     return [_seen(item) for item in value] if isinstance(value, list | tuple) else value
 

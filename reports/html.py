@@ -8,6 +8,7 @@ import base64
 import hashlib
 import itertools
 import json
+import re
 from collections.abc import Mapping
 from functools import cache
 from os import PathLike
@@ -15,7 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined, select_autoescape
-from markupsafe import Markup
+from markupsafe import Markup, escape
 
 from actuator_lti.files.atomic import write_together
 from actuator_lti.files.reading import Tree
@@ -85,6 +86,11 @@ def render(template: str, *, style: str = "", code: str = "", **context: Any) ->
     return environment().get_template(template).render(stylesheet=sheet, **context)
 
 
+def _breakable(name: str) -> Markup:
+    """A long name, which a line may end in behind its dots and equals signs, but not within a number."""
+    return Markup(re.sub(r"=|\.(?=[a-z])", r"\g<0><wbr>", str(escape(name))))
+
+
 @cache
 def environment() -> Environment:
     """Give the template environment: everything is escaped, an unknown name is an error."""
@@ -92,7 +98,7 @@ def environment() -> Environment:
         loader=PackageLoader("reports"), autoescape=select_autoescape(default=True, default_for_string=True),
         finalize=_seen, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True,
     )  # fmt: skip
-    made.filters |= {"show": show, "show_signed": show_signed}
+    made.filters |= {"show": show, "show_signed": show_signed, "breakable": _breakable}
     made.globals |= {"term": _term, "verdict_lines": verdict_lines, "role": role, "why": why}
     made.globals["LONG_TABLE"] = LONG_TABLE
     return made

@@ -15,7 +15,7 @@ from actuator_lti.files.atomic import write_bytes
 from actuator_lti.files.reading import Tree
 from actuator_lti.start.extras import need
 from reports.charts.svg import draw_all
-from reports.document import column, figures, judged, section, shown_fact, table, walk
+from reports.document import column, figures, judged, section, shown_fact, table
 from reports.html import KICKERS, show_signed
 from reports.numbers import show
 from reports.verdict_summary import role, verdict_lines, why
@@ -92,7 +92,7 @@ def printable(made: Mapping[str, Any]) -> Tree:
     """Turn a document into what ``report.typ`` reads; nothing in it is markup any more."""
     drawings = draw_all(figures(made), page=False)
     design, origin = made.get("design") or {}, made.get("provenance") or {}
-    every = (block for part in made["sections"] for block in walk(part))
+    every = (block for part in made["sections"] for block in part["blocks"])  # not those of each variant
     own = (block for block in every if block.get("what", "requirements") == "requirements")
     rows = [
         ("Design", design.get("name")),

@@ -102,7 +102,8 @@ def onset(loops: Loops, omega_rad_s: Any, bias: Mapping[str, float] | None = Non
     """Border of linear validity of a drive over frequency (see `LimiterPath.onset_amplitude_rad`).
 
     Of the command as the user gives it: its rate and acceleration limit (``"profile"``) and the mean of a
-    limited jerk come before all other limiters.
+    limited jerk come before all other limiters, and so does what limits the command of a drive without a
+    position loop.
     """
     used, known = {} if bias is None else bias, ", ".join(loops.limiters) or "none"
     if not used.keys() <= loops.limiters.keys():
@@ -116,9 +117,7 @@ def onset(loops: Loops, omega_rad_s: Any, bias: Mapping[str, float] | None = Non
             name: path.onset_amplitude_rad(omega, used.get(name, 0.0)) / before
             for name, path in loops.limiters.items()
         }
-    profile = profile_onset_rad(loops.design, omega)
-    if np.isfinite(profile).any():
-        each["profile"] = profile
+    each |= _of_the_command(loops, omega)
     if not each:
         return Onset(omega, np.full(omega.shape, np.inf), ("",) * len(omega), {})
     names, table = list(each), np.array(list(each.values()))
@@ -126,6 +125,21 @@ def onset(loops: Loops, omega_rad_s: Any, bias: Mapping[str, float] | None = Non
     lowest = table[first, np.arange(len(omega))]
     active = tuple(names[k] if np.isfinite(a) else "" for k, a in zip(first, lowest, strict=True))
     return Onset(omega, lowest, active, each)
+
+
+def _of_the_command(loops: Loops, omega: np.ndarray) -> dict[str, np.ndarray]:
+    """A_k of the limits of the command itself, as its profile's: no loop stands in front of them."""
+    design, limits = loops.design, loops.design.limits
+    stage, period = design.controller.outermost, design.controller.period_of(design.controller.outermost)
+    change = 2.0 * np.sin(0.5 * omega * period) / period if loops.form == "sampled" else omega
+    each = {"profile": profile_onset_rad(design, omega)}
+    if stage == "velocity":
+        each["speed"] = np.full(omega.shape, limits.speed_rad_s / design.total_ratio)
+        each["acceleration"] = limits.acceleration_rad_s2 / design.total_ratio / change
+    elif stage == "current":
+        each["current"] = np.full(omega.shape, limits.peak_current_A)
+        each["current-rate"] = limits.current_rate_A_s / change
+    return {name: values for name, values in each.items() if np.isfinite(values).any()}
 
 
 @dataclass(frozen=True)

@@ -76,8 +76,9 @@ class Comparison:
 
     @property
     def verdict(self) -> Verdict:
-        """That of all requirements of all designs; not met also where one is refused, or contradicted."""
-        return Verdict.NOT_MET if self.refused or self.unconfirmed else self.tally.verdict
+        """That of all requirements; not met also where a design is refused, not stable, or contradicted."""
+        unstable = any(one.unstable for one in self.everything.all)
+        return Verdict.NOT_MET if self.refused or unstable or self.unconfirmed else self.tally.verdict
 
     def ends(self, name: FigureName) -> tuple[float, float] | None:
         """Best and worst value of a figure over all designs; ``None`` if none is better, or has one."""

@@ -122,13 +122,16 @@ def _made(design: Design, asked: Asked) -> Iterator[tuple[str, str, Design]]:
     low = replace(design, limits=replace(design.limits, voltage_V=asked.supply_V))
     supply = f"{asked.supply_V:g} V"
     named = f"{'low' if asked.supply_V <= design.limits.voltage_V else 'high'} supply"
-    if design.motor.has_electrical_dynamics:
+    electric, thick = design.motor.has_electrical_dynamics, asked.cold_viscous != 1.0
+    if electric:
         yield "hot", f"winding and magnets at {asked.hot_degC:g} °C", hot
-        thick = "" if asked.cold_viscous == 1.0 else f", viscous friction times {asked.cold_viscous:g}"
-        cold = _thickened(at_temperature(design, asked.cold_degC), asked.cold_viscous)
-        yield "cold", f"winding and magnets at {asked.cold_degC:g} °C{thick}", cold
+    if electric or thick:
+        colder = [f"winding and magnets at {asked.cold_degC:g} °C"] * electric
+        colder += [f"viscous friction times {asked.cold_viscous:g}"] * thick
+        cold = at_temperature(design, asked.cold_degC) if electric else design
+        yield "cold", ", ".join(colder), _thickened(cold, asked.cold_viscous)
     yield named, supply, low
-    if design.motor.has_electrical_dynamics:
+    if electric:
         both = replace(hot, limits=low.limits)
         yield f"hot, {named}", f"{asked.hot_degC:g} °C and {supply}", both
     for quantity in CORNERED:
@@ -149,8 +152,10 @@ def at_temperature(design: Design, degC: float) -> Design:
 
 
 def _thickened(design: Design, factor: float) -> Design:
-    """The design with its viscous friction times a factor."""
+    """The design with its viscous friction times a factor; an `InputError` where a map holds it."""
     friction, load = design.friction, design.load
+    if friction.points and factor != 1.0:
+        raise InputError(f"cold viscous factor {factor:g}: a friction map has no viscous part of its own")
     back = None if friction.viscous_reverse_Nms_rad is None else factor * friction.viscous_reverse_Nms_rad
     viscous = factor * friction.viscous_Nms_rad
     if load.friction is not None:

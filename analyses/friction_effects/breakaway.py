@@ -1,18 +1,16 @@
-"""At rest: the smallest command that moves the output, what a slow reversal loses; told and simulated."""
+"""At rest: the smallest command that moves the output, and how long a smaller one waits."""
 
 import math
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.optimize import root_scalar
 
 from actuator_lti.design.model import Command, Design
 from actuator_lti.drive.facts import breakaway_torque_Nm, stall_torque_Nm
 from actuator_lti.drive.operating import holding_torque_Nm
-from actuator_lti.drive.steady import drive_gain, filtered, motor_torque_Nm, torque_gain_Nm_rad
+from actuator_lti.drive.steady import torque_gain_Nm_rad
 from analyses.finite import finite
-from nonlinear import Rows, commands, simulate
-from nonlinear.bench.operating_motion import operating_motion_at
+from nonlinear import Rows
 from nonlinear.settling.rest import first_motion_s
 
 
@@ -133,89 +131,3 @@ def _first_motion_s(design: Design, load_Nm: float, sizes: np.ndarray) -> np.nda
         if design.controller.position_loop.sensor == "output":
             rows["angle_start"] = design.ratio_to_coupling * twist
     return np.array([first_motion_s(rows.running(k)) for k in range(len(sizes))])
-
-
-SPAN = 25.0  # amplitude over the threshold
-PERIOD_SETTLINGS = 16  # settling times (to 1e-9) in one period
-LEAST_TICKS = 4000
-POINTS = 500
-SLOW_RAD_S = 1e-100  # motor speed at which nothing viscous counts
-
-
-@dataclass(frozen=True)
-class Hysteresis:
-    """One settled period of a slow triangle at the command."""
-
-    amplitude_rad: float  # of the triangle; the width depends on its rate where a controller integrates
-    frequency_hz: float
-    command_rad: np.ndarray  # one period at updates of the position loop, thinned
-    output_rad: np.ndarray
-    width_rad: float  # output falling less output rising, both where the command passes zero
-    # The same without dry friction, its feed-forward and play: what the loop lags by at this rate
-    linear_width_rad: float
-    largest_rad: float  # distance of the output from that without dry friction and play, at any update
-    predicted_rad: float  # what a reversal loses of a slow command: `lost_predicted_rad`
-
-    @property
-    def lost_motion_rad(self) -> float:
-        """What friction and play add to the width."""
-        return self.width_rad - self.linear_width_rad
-
-
-def hysteresis(design: Design, load_Nm: float, static: StaticThreshold, settling_ticks: int) -> Hysteresis:
-    """Simulate a slow triangle with and without dry friction and play and compare the two branches."""
-    ticks = max(PERIOD_SETTLINGS * settling_ticks, LEAST_TICKS)
-    every = design.controller.position_loop.every
-    ticks = 4 * every * round(ticks / (4 * every))
-    period = ticks * design.controller.period_s
-    smallest = min(design.validation.amplitude_fractions) * design.validation.full_deflection_rad
-    unfed, play = replace(design.controller.position_loop, friction_feedforward=0.0), 0.0
-    tight = replace(design, controller=replace(design.controller, position=unfed))
-    if design.coupling is not None:
-        play = design.coupling.play_rad / design.ratio_behind_coupling
-        tight = replace(tight, coupling=replace(design.coupling, play_rad=0.0))
-    amplitude = min(SPAN * (static.forward_rad + play), max(smallest, 2.0 * play))
-    command = commands.triangle(amplitude, 1.0 / period)
-    widths, outputs, updates = [], [], ticks // every
-    for drive, friction_on in ((tight, False), (design, True)):
-        run = simulate(drive, command, 1.25 * period, load_Nm, friction_on=friction_on, record_every=every)
-        y = run.output_angle_rad[-updates:]  # from the first reversal on, where it slides settled already
-        widths.append(float(y[updates // 4] - y[3 * updates // 4]))
-        outputs.append(y)
-    shown = slice(-updates, None, max(1, updates // POINTS))
-    return Hysteresis(
-        amplitude, 1.0 / period, run.reference_rad[shown], run.output_angle_rad[shown],
-        widths[1], widths[0], float(np.max(np.abs(outputs[1] - outputs[0]))),
-        lost_predicted_rad(design, load_Nm, static, 4.0 * amplitude / period),
-    )  # fmt: skip
-
-
-def lost_predicted_rad(design: Design, load_Nm: float, static: StaticThreshold, rate_rad_s: float) -> float:
-    """What dry friction and play lose at a reversal of a slow command, where the command passes zero.
-
-    Where nothing integrates, the torque of sliding needs an error, over the stiffness; one integral of time T
-    needs ``T dT_f/dt`` where friction grows with a load that bends over the angle, two none. A spring lags by
-    its twist and half its play, unless the position loop sees the output itself.
-    """
-    branches = (_lag_rad(design, load_Nm, static, way * rate_rad_s) for way in (1.0, -1.0))
-    return next(branches) - next(branches)
-
-
-def _lag_rad(design: Design, load_Nm: float, static: StaticThreshold, rate_rad_s: float) -> float:
-    """Command less output while the drive slides through zero of the command at a rate."""
-    loop, load, sense = design.controller.position_loop, design.load, math.copysign(1.0, rate_rad_s)
-    fed = sense * loop.friction_feedforward * float(drive_gain(design) * filtered(design, "torque"))
-
-    def missing(lag: float) -> float:
-        moment = load_Nm + float(load.moment_Nm(-lag))
-        motion = operating_motion_at(design, sense * SLOW_RAD_S, moment)
-        torque = motor_torque_Nm(design, motion.current_A, motion.voltage_V) - fed
-        if static.integral_time_s is not None:
-            carried = -moment if design.coupling is None else motion.coupling_Nm
-            slope = -np.sign(carried) * load.over_angle.slope_at(-lag, moving=True)
-            growth = design.friction.load_coefficient * slope * abs(rate_rad_s)
-            torque = static.integral_time_s * growth if static.outer_integral_time_s is None else 0.0
-        twist = motion.twist_rad / design.ratio_behind_coupling if loop.sensor == "motor" else 0.0
-        return lag - torque / static.torque_gain_Nm_rad - twist
-
-    return float(root_scalar(missing, x0=0.0, x1=-missing(0.0) or 1e-12).root)

@@ -10,7 +10,8 @@ from actuator_lti.design.loader import AnyDesign, as_design
 from actuator_lti.design.model import Design
 from actuator_lti.drive.operating import dry_torque
 from actuator_lti.loops import Loops, assemble_loops
-from analyses.friction_effects.breakaway import Hysteresis, Threshold, hysteresis, threshold
+from analyses.friction_effects.breakaway import Threshold, threshold
+from analyses.friction_effects.reversal import Hysteresis, hysteresis
 from analyses.large_signal.tones import linear_steady_state
 from analyses.limit_cycles.describing import Cycle, at_load, cycles_of_friction, dry_Nm
 from analyses.limit_cycles.run import Confirmation, confirm

@@ -15,10 +15,17 @@ from analyses.estimation.parameters import Parameter, parameter
 from analyses.estimation.series import correlation_time
 from analyses.identification.friction_law import Bend, bend_of, kept_columns
 from analyses.identification.inverse import fit_records
-from analyses.identification.joint_model import JointModel, Recipe, RecordFit
+from analyses.identification.joint_model import JointModel, Recipe, RecordFit, Rows
 from analyses.identification.output_error import simulated_part
 from analyses.identification.own_bias import with_model_signals
-from analyses.identification.rows import drive_of, is_benchmark, recipe_for, record_rows, rows_under
+from analyses.identification.rows import (
+    drive_of,
+    driven_rows,
+    is_benchmark,
+    recipe_for,
+    record_rows,
+    rows_under,
+)
 from analyses.records.consistency import ALIKE, SURE, Finding, clock_doubt, resistance_doubt
 from analyses.records.naming import KNOWN_UNITS
 from analyses.records.record import Record, lasting
@@ -228,25 +235,25 @@ def lag_of(design: Design, record: Record, simulated: Record, model: JointModel)
     inertia and friction.
     """
 
-    def slopes(record: Record) -> Floats:
+    def slopes(record: Record, rows: Rows, driven: Callable[[Record], Floats]) -> Floats:
         """Columns of the model, and by how much the drive of each row falls with a shift, N m/s."""
         half = 0.5 * record.period_s
-        late, early = (rows_under(design, shifted(design, record, s), model) for s in (half, -half))
-        return np.column_stack([late.columns(model.names), (early.y - late.y) / (2.0 * half)])
+        late, early = (driven(shifted(design, record, s)) for s in (half, -half))
+        return np.column_stack([rows.columns(model.names), (early - late) / (2.0 * half)])
 
     try:
         own, other = (rows_under(design, one, model) for one in (record, simulated))
         if len(other.keep) > len(own.keep):
             return None
         both = own.shared(other)
-        z = other.at(both, slopes(simulated))
+        z = other.at(both, slopes(simulated, other, driven_rows(design, simulated, other)))
         if len(z) <= z.shape[1] or len(told_apart(z, (*model.names, "lag"))[0]) < z.shape[1]:
             return None
-        lag, error = 0.0, np.inf
+        lag, error, driven = 0.0, np.inf, driven_rows(design, record, own)
+        known = driven(record) - own.y + model.kept(own)
         for _ in range(ROUNDS):
             late = shifted(design, record, lag)
-            y = own.at(both, rows_under(design, late, model).y - model.kept(own))
-            table = own.at(both, slopes(late))
+            y, table = (own.at(both, one) for one in (driven(late) - known, slopes(late, own, driven)))
             step, error = _step(z, table, y)
             lag += float(np.clip(step, -LARGEST_STEP_S, LARGEST_STEP_S))
             if abs(step) < SETTLED * error:

@@ -1,6 +1,6 @@
 """The rows of the regression that one record gives: motion, drive torque, load, rest left out."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -308,6 +308,18 @@ def _torque(design: Design, record: Record, motion: Motion, recipe: Recipe) -> t
         back = constant if motor.back_emf_constant_Vs_rad is None else motor.back_emf_constant_Vs_rad
         drive = drive - constant * back / motor.resistance_ohm * motion.velocity
     return drive, driven_by, told
+
+
+def driven_rows(design: Design, record: Record, rows: Rows) -> Callable[[Record], Floats]:
+    """The drive torque at the rows of a record, of others that differ from it in the drive signal alone."""
+    design, recipe = record.drive(design), rows.recipe
+    motion = _balance(design, prepared(record), recipe, gravity=False).motion
+
+    def driven(other: Record) -> Floats:
+        drive = _torque(design, prepared(other), motion, recipe)[0]
+        return decimated(drive[recipe.part(len(drive))], recipe.decimation)[rows.keep]
+
+    return driven
 
 
 def rows_under(design: Design, record: Record, model: JointModel) -> Rows:

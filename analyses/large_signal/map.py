@@ -60,11 +60,12 @@ class AmplitudeMap(Compared):
 
     @property
     def phase_deg(self) -> np.ndarray:
-        """Phase of the fundamental, unwrapped along frequency; NaN where nothing moves."""
+        """Phase of the fundamental, unwrapped from the linear one on; NaN where nothing moves."""
         moving = np.abs(self.response) > 1e-4 * np.abs(self.linear)
-        phases = np.full(self.response.shape, np.nan)
+        phases, linear = np.full(self.response.shape, np.nan), np.unwrap(np.angle(self.linear))
         for phase, row, ok in zip(phases, self.response, moving, strict=True):
-            phase[ok] = np.degrees(np.unwrap(np.angle(row[ok])))
+            first = linear[np.flatnonzero(ok)[:1]]
+            phase[ok] = np.degrees(np.unwrap(np.append(first, np.angle(row[ok])))[first.size :])
         return phases
 
     def plot_map(self, axes: Any = None, *, linear_axis: bool = False) -> Axes:

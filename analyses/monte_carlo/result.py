@@ -261,9 +261,16 @@ class MonteCarloResult:
         return Tally.of(map(self.judged, each), [o.waiver is not None for o in each]) + tally(self.left_out)
 
     @property
+    def unstable(self) -> float:
+        """Share of the samples in which the outermost loop, the drive as a whole, is not stable."""
+        kept = [one for name, one in self.columns.items() if name.endswith(".sensitivity_peak")]
+        return kept[-1].missing / kept[-1].count if kept else 0.0  # every stable loop has one
+
+    @property
     def verdict(self) -> Verdict:
-        """That of all requirements."""
-        return self.tally.verdict
+        """That of all requirements; not met also where fewer drives than are enough are stable."""
+        lost = self.unstable > (0.0 if self.at_least is None else 1.0 - self.at_least)
+        return Verdict.NOT_MET if lost else self.tally.verdict
 
     def case(self, odds: Odds) -> WorstCase | None:
         """The worst case of a requirement, where one was sought."""

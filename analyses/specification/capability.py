@@ -10,7 +10,12 @@ from actuator_lti.design.model import Command, Design
 from actuator_lti.design.plant import no_load_speed
 from actuator_lti.drive import facts
 from actuator_lti.drive.facts import stall_torque_Nm, steady_torque_Nm
-from actuator_lti.drive.steady import motor_torque_Nm, voltage_limit_torque_Nm
+from actuator_lti.drive.steady import (
+    back_emf_Nms_rad,
+    drive_gain,
+    motor_torque_Nm,
+    voltage_limit_torque_Nm,
+)
 from analyses.large_signal.tones import tone
 from nonlinear import commands, simulate
 
@@ -125,6 +130,7 @@ def torque_speed_plane(design: Design, top_speed_rad_s: float) -> TorqueSpeedPla
     motor, limits = design.effective_motor, design.limits
     top = top_speed_rad_s if 0.0 < top_speed_rad_s < math.inf else 1.0
     speed = np.linspace(0.0, 1.25 * top, PLANE_POINTS)
+    ends = speed[[0, -1]]
     bounds, levels = list[Curve](), dict[str, float]()
     if motor.source_gain_Nm_V is not None:
         levels["drive signal at its limit"] = stall_torque_Nm(design)
@@ -132,10 +138,10 @@ def torque_speed_plane(design: Design, top_speed_rad_s: float) -> TorqueSpeedPla
         if math.isfinite(limits.voltage_V):
             line = np.linspace(0.0, no_load_speed(design), PLANE_POINTS)
             bounds.append(Curve("voltage limit", line, voltage_limit_torque_Nm(design, line)))
-        if design.controller.current is not None:
-            levels["peak current"] = motor_torque_Nm(design, limits.peak_current_A, math.nan)
+        if design.controller.current is not None and math.isfinite(limits.peak_current_A):  # a P loop: a part
+            asked = drive_gain(design) * limits.peak_current_A
+            bounds.append(Curve("peak current", ends, asked - back_emf_Nms_rad(design) * ends))
         levels["continuous current"] = motor_torque_Nm(design, limits.continuous_current_A, math.nan)
-    ends = speed[[0, -1]]
     bounds += [Curve(name, ends, np.full(2, level)) for name, level in levels.items() if math.isfinite(level)]
     if design.controller.velocity is not None and math.isfinite(limits.speed_rad_s):
         high = max((float(curve.torque_Nm.max()) for curve in bounds), default=1.0)

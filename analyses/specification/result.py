@@ -53,6 +53,10 @@ def step_times(
     rows["ticks"] = wait
     result = rows.run()
     speeds, currents = result.extreme("motor_speed_rad_s"), result.extreme("current_A")
+    peaks = np.maximum(-speeds[0], speeds[1]) / design.total_ratio
+    if design.coupling is not None:  # the load swings on its spring
+        runs = (rows.take(np.array([k])).trajectory() for k in range(len(sizes)))
+        peaks = np.array([np.nanmax(np.abs(np.asarray(run.output_speed_rad_s))) for run in runs])
     electric = design.motor.has_electrical_dynamics
     limited = {name: result.limit_fraction(name) for name in LIMITERS}
     return tuple(
@@ -63,7 +67,7 @@ def step_times(
             rise_time_s=finite(result.step.rise_time_s[k]),
             overshoot_percent=float(result.step.overshoot_percent[k]),
             settling_time_s=finite(result.step.settling_time_s[k]),
-            peak_rate_rad_s=float(max(-speeds[0][k], speeds[1][k])) / design.total_ratio,
+            peak_rate_rad_s=float(peaks[k]),
             peak_current_A=float(max(-currents[0][k], currents[1][k])) if electric else None,
             limits={name: float(share[k]) for name, share in limited.items() if share[k] > 0.0},
         )

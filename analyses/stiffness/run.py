@@ -16,6 +16,7 @@ from actuator_lti.design.model import Design, LoadFriction
 from actuator_lti.drive.operating import Operating, OperatingPoint, stiffness_there
 from actuator_lti.errors import InputError, UnstableError
 from actuator_lti.loops import stiffness as linear
+from analyses.large_signal.classify import STEADY
 from analyses.motion.settling import settling_ticks_of
 from analyses.specification.requirements import RequirementVerdict, judged_by, tally
 from nonlinear import commands, simulate, tangent
@@ -75,7 +76,10 @@ class Check:
 
 @dataclass(frozen=True)
 class AtRest:
-    """Fundamental stiffness of the drive as it is, at rest, to a sinusoidal moment; inf: no motion."""
+    """Fundamental stiffness of the drive as it is, at rest, to a sinusoidal moment.
+
+    inf: no motion; NaN: none that comes again in the next period, as of a drive that hunts.
+    """
 
     moment_Nm: float
     frequency_hz: float
@@ -177,8 +181,10 @@ def stiffness_at_rest(design: Design, asked: Sequence[tuple[float, float]]) -> t
         moment = np.tile(-amplitude * turn.imag, skipped + 2)
         run = simulate(design, commands.hold(), count * period, series(np.arange(count) * period, moment))
         both = (moment, run.output_angle_rad - run.output_angle_rad[-1])  # at rest: 0 to the last digit
-        given, seen = ((signal[skipped * ticks :].reshape(2, ticks) @ turn).sum() for signal in both)
-        K = complex(given / seen) if seen != 0.0 else complex(np.inf)
+        given, seen = (signal[skipped * ticks :].reshape(2, ticks) @ turn for signal in both)
+        K = complex(given.sum() / seen.sum()) if seen.any() else complex(np.inf)
+        if abs(seen[1] - seen[0]) > STEADY * abs(seen).max():
+            K = complex(np.nan)
         made.append(AtRest(amplitude, 1.0 / (ticks * period), K))
     return tuple(made)
 

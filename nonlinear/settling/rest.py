@@ -12,8 +12,10 @@ question is asked of the whole state, and the drive is followed until it is answ
   times and swings (to `ALIKE`): what follows from there is known, so it does so for ever.  Or of `PERIODS`
   swings or more the later half is as large as the earlier, of the motor, too, and an event, a limit or a
   sensor's counts are in it, as a linear drive has none.  (A load that nothing damps swings on, at any size,
-  while the motor comes to rest: no cycle.)  Which one a drive ends in may depend on the step;
-- *diverging*: no finite state, or a motion that still grows at the end of the work;
+  while the motor comes to rest: no cycle.)  Which one a drive ends in may depend on the step.  Or swings of
+  many sizes go on up to the end of the work, and have not shrunk part by part since its first quarter;
+- *diverging*: no finite state, or a motion that still grows at the end of the work, without a limit in each
+  of its parts;
 - *still moving*: none of these within `MOST_WORK` ticks and integration steps, as a stiff drive takes
   thousands of steps a tick.
 """
@@ -37,7 +39,7 @@ from nonlinear.settling import drift
 
 Verdict = Literal["at rest", "limit cycle", "still moving", "diverging"]
 
-PERIODS, ALIKE = 8, 0.01
+PERIODS, ALIKE, PARTS = 8, 0.01, 8
 MOST_WORK = 4_000_000  # ticks, and integration steps within them
 PIECE_TICKS = 4096
 PART_WORK = 4096  # ticks and steps after which the work is looked at, where ticks may take many steps
@@ -135,16 +137,21 @@ class _Watch:
                 return self._rest("limit cycle", *cycle)
             if len(self.seen) >= due:
                 due += due // 2
-                swing = self._swing()
-                if self._faint(swing):
-                    return self._rest("at rest")
-                if swing.alike and self._bent() and self._motor_keeps_on():
-                    return self._rest("limit cycle", swing)
-                if self._idle():
-                    return self._rest("at rest")
+                if (known := self._known()) is not None:
+                    return known
+        if (known := self._known()) is not None:
+            return known
+        if self._grows():
+            return self._rest("diverging", self._swing())
+        return self._rest("limit cycle" if self._goes_on() else "still moving", self._swing())
+
+    def _known(self) -> Rest | None:
+        """What is seen in the last half of the entries; None: nothing that tells the end."""
         if self._faint(swing := self._swing()):
             return self._rest("at rest")
-        return self._rest("diverging" if self._grows() else "still moving", swing)
+        if swing.alike and self._bent() and self._motor_keeps_on():
+            return self._rest("limit cycle", swing)
+        return self._rest("at rest") if self._idle() else None
 
     def _advance(self, periods: int) -> Piece:
         """Go on and keep one entry a period."""
@@ -287,10 +294,29 @@ class _Watch:
         return bool(self.drive.p[at.HAS_POSITION] <= 0.0)
 
     def _grows(self) -> bool:
-        """Whether the command was never missed by more than in the last quarter of the entries."""
+        """Whether the command was never missed by more than in the last quarter of the entries.
+
+        Where no limit acts, that may be chance: a drive that is then linear grows in each part of them.
+        """
         command, followed, _ = np.concatenate(self.seen, axis=1)
-        missed = [float(part.max()) for part in np.array_split(np.abs(command - followed), 4)]
-        return missed[3] > (1.0 + ALIKE) * max(missed[:3])
+        missed = [float(part.max()) for part in np.array_split(np.abs(command - followed), PARTS)]
+        limited = any(flags & ~at.FLAG_STICK for _, flags, _ in self._late())
+        grown = max(missed[-2:]) > (1.0 + ALIKE) * max(missed[:-2])
+        return grown and (limited or all(a < b for a, b in pairwise(missed[PARTS // 2 :])))
+
+    def _goes_on(self) -> bool:
+        """Whether what swings at the end of the work, the motor too, has not shrunk part by part.
+
+        What follows need not repeat: friction that is left and met again makes swings of many sizes.
+        """
+        if self._swing().frequency_hz is None or not self._bent():
+            return False
+        moved = np.concatenate(self.seen, axis=1)[1:]
+        for signal in (moved[np.argmax(np.ptp(self._half()[1][1:], axis=1))], moved[1]):
+            spans = [float(np.ptp(part)) for part in np.array_split(signal, PARTS)][2:]
+            if all(a > b for a, b in pairwise(spans)) or not 2.0 * max(spans[-2:]) > max(spans):
+                return False
+        return True
 
     def _idle(self) -> bool:
         """Whether nothing moved in the later half of the pieces, and what goes on in it keeps its range."""

@@ -7,7 +7,7 @@ from itertools import accumulate, takewhile
 from actuator_lti.design import read_design_text, with_overrides
 from actuator_lti.design.mistakes import lines_of
 from actuator_lti.design.model import Design
-from actuator_lti.design.writing import overridden_text, write_design
+from actuator_lti.design.writing import design_tree, overridden_text, write_design
 from actuator_lti.errors import InputError
 from actuator_lti.files.reading import Tree, parse_toml
 
@@ -30,17 +30,18 @@ def patches(design: Design, keys: Sequence[Tree], source: str | None = None) -> 
     Without it, or where a key cannot be changed in it, all is written anew.
     """
     if source is not None:
-        own = [_own(design, key, source) for key in keys]
+        lines = lines_of(source, parse_toml(source, "design"))
+        own = [_own(design, key, source, lines) for key in keys]
         if (found := [each for each in own if each is not None]) == own:
             return source, found
     text = write_design(design)
     return text, [_patch(text, overridden_text(design, key["path"], MARK)) for key in keys]
 
 
-def _own(design: Design, key: Tree, text: str) -> Patch | None:
+def _own(design: Design, key: Tree, text: str, lines: dict[str, int]) -> Patch | None:
     """The patch of a key in a text of the user; None where the changed text would not say the same."""
     path, known = key["path"], design.parameters.get(key["path"])
-    place = _entry_of(path, text)
+    place = _entry_of(path, text, lines)
     made = _added(path, text)
     if place is not None and known is not None:
         changed = _changed(text[slice(*place)], known.text)
@@ -56,12 +57,11 @@ def _own(design: Design, key: Tree, text: str) -> Patch | None:
         wanted = with_overrides(design, {path: value})
     except InputError:
         return None
-    return made if write_design(read) == write_design(wanted) else None
+    return made if design_tree(read) == design_tree(wanted) else None
 
 
-def _entry_of(path: str, text: str) -> tuple[int, int] | None:
+def _entry_of(path: str, text: str, lines: dict[str, int]) -> tuple[int, int] | None:
     """Where the entry of a key stands: its line, or the lines of its own table."""
-    lines = lines_of(text, parse_toml(text, "design"))
     number = lines.get(path)
     if number is None:
         return None

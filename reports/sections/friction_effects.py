@@ -86,8 +86,8 @@ def _threshold_table(result: FrictionEffects, fine: Unit, load: str) -> doc.Bloc
     ]
     note = f"{_integrates(result)}: a step below the threshold {_below(result)}"
     note += (
-        f", and motion lost in front of its sensor is recovered{_behind(result)}. The effect is largest just "
-        "after a reversal."
+        f", and motion lost in front of its sensor is recovered in its time{_behind(result)}. The effect is "
+        "largest just after a reversal."
         if result.integrator
         else f". Each reversal loses the torque that sliding takes, both ways, over the stiffness"
         f"{_behind(result)}."

@@ -216,9 +216,11 @@ def _sawtooth(sawtooth: Sawtooth, out: Unit, load: str) -> doc.Block:
         for panel, end in zip(panels, (highest, 1.5 * limit, 1.08 * current), strict=False):
             panel.y.limits(-end, end)
         panels[0].y.limits(high=2.6 * highest)  # room for the words
+    turns = sawtooth.reversal_deg < 180.0
+    becomes = "the output becomes a sawtooth" if turns else "no sawtooth, as it reverses too slowly"
     caption = (
         f"A sine of {out.of(sawtooth.amplitude_rad)} at {sawtooth.frequency_hz:.3g} Hz, three "
-        f"times faster than the rate limit of {short(limit)} {rate.unit}: the output becomes a sawtooth. "
+        f"times faster than the rate limit of {short(limit)} {rate.unit}: {becomes}. "
         "Simulated values; in brackets those of an ideal rate limit: peak πR/2w, gain 4/(πx), lag "
         "arccos(π/2x)."
     )

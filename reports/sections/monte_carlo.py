@@ -40,6 +40,7 @@ def section(result: MonteCarloResult) -> doc.Section:
         "case in the whole tolerance box, as sampling alone does not find it."
     )
     words, status = _result(result), result.tally.role
+    status = "fail" if result.verdict is Verdict.NOT_MET else status
     return doc.section("monte-carlo", "Tolerances", blocks, result=words, intro=intro, status=status)
 
 
@@ -71,14 +72,19 @@ def _result(result: MonteCarloResult) -> str:
     each = {odds.id: odds for odds in result.odds}
     if (every := each.pop("all", None)) is None:
         said = words if result.left_out else "The design states no requirement"
-        return f"{said}; {result.samples} samples were drawn."
+        return f"{said}; {result.samples} samples were drawn.{_lost(result)}"
     words += f"; {every.passed} of {every.count} samples meet every one"
     words += " that is sampled" * bool(result.left_out)
     weakest = min(each.values(), key=lambda odds: odds.probability, default=None)
     if weakest is not None and weakest.probability < 1.0:
         share = f"{100.0 * weakest.probability:.3g} % meet it"
         words += f"; the one missed most often is {weakest.label} ({share})"
-    return f"{words}."
+    return f"{words}.{_lost(result)}"
+
+
+def _lost(result: MonteCarloResult) -> str:
+    share = f"{100.0 * result.unstable:.3g} %"
+    return f" The drive is not stable in {share} of the samples." if result.unstable else ""
 
 
 def _verdicts(result: MonteCarloResult) -> list[doc.VerdictItem]:

@@ -140,7 +140,7 @@ def _lost_motion(result: Stiffness) -> doc.Block:
 def _at_rest(result: Stiffness, unit: str) -> doc.Block:
     note = (
         "Fundamental of the simulated drive as it is, with its dry friction, play and quantisation, the "
-        "command held. No value: the output does not move."
+        "command held. No value: the output does not move, or not the same in the next period."
     )
     of_load = result.design.load_unit
     columns = [

@@ -149,6 +149,26 @@ def test_many_drives_are_each_of_them_alone(name: str, load: float) -> None:
             assert mine == pytest.approx(getattr(alone, attribute), rel=1e-12, nan_ok=True), attribute
 
 
+@pytest.mark.parametrize(("inner", "key", "limit", "name"), [
+    ("velocity", "acceleration_rad_s2", 3000.0, "acceleration"), ("velocity", "speed_rad_s", 90.0, "speed"),
+    ("current", "current_rate_A_s", 500.0, "current-rate"), ("current", "peak_current_A", 3.0, "current"),
+])  # fmt: skip
+def test_a_drive_without_a_position_loop_is_linear_up_to_the_limits_of_its_command(
+    inner: str, key: str, limit: float, name: str
+) -> None:
+    """A limit L of the command, or L T/(2 sin(w T/2)) of its change; a hair above it the simulator's acts."""
+    loops = {"position": None} | ({"velocity": None} if inner == "current" else {})
+    design = changed(load_design("ilr33-amber"), controller=loops, limits={key: limit}, requirements=())
+    hz, Ts = 40.0, design.controller.period_s
+    N = design.total_ratio if inner == "velocity" else 1.0
+    level = limit / N if name in ("speed", "current") else limit / N * Ts / (2.0 * np.sin(np.pi * hz * Ts))
+    border = onset(assemble_loops(design), [2.0 * np.pi * hz])
+    assert border.each_rad[name][0] == pytest.approx(level, rel=1e-12)
+    for share in (0.999, 1.001):
+        run = simulate(design, commands.sine(share * level, hz), 0.2)
+        assert (run.limits[name].fraction > 0.0) == (share > 1.0)
+
+
 @pytest.mark.parametrize("stages", [(), ("position",)])
 def test_the_speed_command_is_clamped_whoever_gives_it(stages: tuple[str, ...]) -> None:
     """By hand, and where the simulator ends up, a speed drive too; without a velocity loop nothing does."""

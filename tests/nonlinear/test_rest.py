@@ -21,7 +21,7 @@ from nonlinear._kernels import layout as at
 from nonlinear.bench.operating_motion import quiet
 from nonlinear.runs.reduced import BatchResult
 from nonlinear.settling.drift import overload, ticks_until_it_acts
-from nonlinear.settling.rest import _repeated, first_motion_s, judge
+from nonlinear.settling.rest import _repeated, _Watch, first_motion_s, judge
 from reports.sections.cycles import summary
 from reports.sections.names import fine_unit
 from tests.changed import changed
@@ -291,6 +291,47 @@ def test_all_who_ask_get_one_answer(seed: int, monkeypatch: pytest.MonkeyPatch) 
     else:
         wanted = (words(swing.rest, *fine_unit(design.axis)), ending_of(design, swing))
         assert all(part in text for text, part in zip(said, wanted, strict=True))
+
+
+@pytest.mark.parametrize("ticks", [4096, 2900])
+def test_a_drive_that_hunts_unevenly_hunts_whenever_the_judge_looks(ticks, monkeypatch) -> None:
+    """Two integrals, coarse counts and play: no two of its swings are one, and in 250 s they never shrink."""
+    hunting = {
+        "coupling.play": np.radians(0.02), "encoder.counts_per_rev": 2048, "control.velocity.gain": 0.1,
+        "control.velocity.integral_time": 0.05, "control.position.gain": 16.0,
+        "control.position.integral_time": 1.5,
+    }  # fmt: skip
+    monkeypatch.setattr("nonlinear.settling.rest.PIECE_TICKS", ticks)
+    rest = judge(simulate(with_values(JOINT, hunting), commands.step(0.006145), 0.02).running)
+    assert (rest.verdict, rest.limited) == ("limit cycle", ())
+    assert rest.amplitude == pytest.approx(2.4e-4, rel=0.1)
+
+
+def watch_of(seen: np.ndarray, flags: int = 0) -> _Watch:
+    """A judge at the end of its work that has seen the output, and the motor, do that; with events."""
+    watch = _Watch(simulate(AMBER, commands.step(1e-3), 0.01).running.held(), 1)
+    watch.times, watch.seen = [np.arange(seen.size, dtype=float)], [np.stack([0.0 * seen, seen, seen])]
+    watch.acted = [(seen.size, flags, 1)]
+    return watch
+
+
+def test_swings_of_many_sizes_go_on_and_one_larger_than_all_before_is_no_divergence() -> None:
+    """Sizes by chance, the largest last or not; decaying, growing, and at rest in the last quarter."""
+    swing, chance = np.sin(2.0 * np.pi * np.arange(6400) / 100.0), np.random.default_rng(3)
+    ends = []
+    for _ in range(20):
+        watch = watch_of(swing * np.repeat(chance.uniform(0.7, 1.0, 64), 100))
+        ends.append((watch._goes_on(), watch._grows()))
+    assert set(ends) == {(True, False)}
+    time = np.linspace(0.0, 1.0, swing.size)
+    assert not watch_of(swing * np.exp(-0.1 * time))._goes_on()
+    assert not watch_of(swing * (time < 0.75))._goes_on()
+    assert watch_of(swing * np.exp(time))._grows()
+    largest_last = swing * np.where(time > 0.95, 1.1, 1.0)
+    assert (watch_of(largest_last)._grows(), watch_of(largest_last, at.FLAG_CURRENT)._grows()) == (
+        False,
+        True,
+    )
 
 
 def test_a_stiff_drive_is_left_where_its_work_ends() -> None:

@@ -10,7 +10,7 @@ import pytest
 
 from actuator_lti import load_design
 from actuator_lti.asked.verdict import Verdict
-from actuator_lti.design import with_overrides
+from actuator_lti.design import with_overrides, write_design
 from analyses.comparison.variants import Comparison, compare
 from analyses.slugs import slug
 from analyses.specification.requirements import RequirementVerdict
@@ -133,6 +133,11 @@ def test_an_unstable_variant_has_no_margins_is_named_so_and_is_the_worst(tmp_pat
     assert " Not stable: Torn 400, Position loop." in brief(found).words
     row = list(csv.DictReader(io.StringIO(table_text(found))))[1]
     assert (row["unstable"], row["room_percent"], row["position.phase_margin [deg]"]) == ("position", "", "")
+    (tmp_path / "bare.toml").write_text(write_design(replace(joint, requirements=())))
+    path.write_text(UNSTABLE.replace('"joint"', '"bare.toml"'))
+    assert compare(path, validation=False).verdict == "not met"  # as by margins, whatever is required
+    path.write_text(UNSTABLE.replace('"joint"', '"bare.toml"').replace("400 1/s", "9 1/s"))
+    assert compare(path, validation=False).verdict == "met"
 
 
 @pytest.fixture(scope="module")

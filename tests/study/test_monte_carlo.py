@@ -10,6 +10,7 @@ from toleranced import asked_twice, toleranced
 
 from actuator_lti import assemble_loops, load_design, read_design_text, write_design
 from actuator_lti.batch import Population, linear_figures
+from actuator_lti.design import with_overrides
 from actuator_lti.design.asked import Requirement, Waiver
 from analyses.comparison.found import small_signal
 from analyses.linear.loop_figures import all_loop_figures
@@ -303,3 +304,13 @@ def test_pages_of_studies_stand_alone_and_show_every_figure(cli, browser, name, 
         for k in range(drawn.count()):
             assert drawn.nth(k).bounding_box()["width"] > 200
             assert drawn.nth(k).locator(".world path, .marks use").count() > 1
+
+
+def test_drives_that_are_not_stable_do_not_pass_whatever_is_required(tmp_path) -> None:
+    """Position gain 400 1/s of 8, 34 dB, where the joint has 25.9; it is stable in every sample."""
+    joint = replace(load_design("joint"), requirements=())
+    for gain, verdict, words in (("8 1/s", "met", ""), ("400 1/s", "not met", "is not stable in 100 %")):
+        design = with_overrides(joint, {"control.position.gain": gain})
+        result = monte_carlo(design, tmp_path / gain[:3].strip(), replace(PLAIN, samples=60))
+        assert result.verdict == verdict
+        assert words in brief(result).words

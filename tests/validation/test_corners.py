@@ -12,7 +12,7 @@ from actuator_lti.batch import Population
 from actuator_lti.design import design_tree, load_design, read_design_text, with_overrides, write_design
 from actuator_lti.design.access import with_values
 from actuator_lti.design.loader import design_from_tree
-from actuator_lti.design.model import Requirement
+from actuator_lti.design.model import Friction, Requirement
 from analyses.corners import Asked, corners
 from analyses.corners.run import worst_ends
 from analyses.monte_carlo import MonteCarloSettings, monte_carlo
@@ -22,6 +22,7 @@ from analyses.specification.requirements import evaluate_requirements
 from analyses.specification.sensitivity import population_figures
 from reports.build import further_sections
 from reports.sections.corners import chart, section
+from tests.nonlinear.elastic_drive import stribeck
 from tests.refusals import refused
 
 FIN, EMPS = load_design("fin"), load_design("emps")
@@ -122,6 +123,16 @@ def test_a_source_has_no_temperature() -> None:
     refused(Asked.of, EMPS, supply_V=-1.0, words="must be positive")
     above = Asked.of(EMPS, supply_V=2.0 * EMPS.limits.voltage_V)
     assert corners(EMPS, above).corners[1].name == "high supply"
+
+
+def test_grease_that_thickens_is_never_left_out_without_a_word() -> None:
+    """A force source has no temperature, its grease has; of a map nobody knows what is grease."""
+    thick = 3.0
+    (cold,) = (one for one in corners(EMPS, Asked.of(EMPS, cold_viscous=thick)).corners if one.name == "cold")
+    assert cold.words == "viscous friction times 3"
+    assert cold.design.friction.viscous_Nms_rad == thick * EMPS.friction.viscous_Nms_rad
+    mapped = replace(EMPS, friction=Friction(points=stribeck((0.0, 20.0), (0.1, 30.0))))
+    refused(corners, mapped, Asked.of(mapped, cold_viscous=thick), words="a friction map has no viscous part")
 
 
 def test_a_value_set_to_zero_loses_its_relative_tolerance() -> None:

@@ -2,14 +2,19 @@
 
 import json
 import math
+from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from actuator_lti import assemble_loops, load_design
 from actuator_lti.design import model, with_values
 from analyses.friction_effects import friction_effects
-from analyses.friction_effects.breakaway import Hysteresis, hysteresis, static_threshold, threshold
+from analyses.friction_effects.breakaway import static_threshold, threshold
+from analyses.friction_effects.orbit import Orbit
 from analyses.friction_effects.result import limit_cycles
+from analyses.friction_effects.reversal import Hysteresis, _width, hysteresis
+from analyses.large_signal.tones import linear_steady_state
 from analyses.limit_cycles.stick_slip import _slip, stick_slip_cycle
 from analyses.motion.settling import SMALL, settle, settlings_of
 from nonlinear import Rows
@@ -106,6 +111,38 @@ def test_what_a_reversal_loses_is_predicted(name, load_Nm, expected, within):
     rounding = 1e-12 * loop.amplitude_rad
     assert loop.predicted_rad == pytest.approx(expected(loop), rel=1e-6 + within, abs=rounding)
     assert loop.lost_motion_rad == pytest.approx(loop.predicted_rad, rel=within, abs=rounding)
+
+
+@pytest.mark.parametrize(("design", "T", "U"), [
+    *((with_values(AMBER, {"control.velocity.integral_time": T}), T, math.inf) for T in (0.5, 4.0, 1e3)),
+    *((extruder(U, T), T, U) for T, U in ((10.0, 100.0), (10.0, 0.4))),
+    (with_values(JOINT, {"control.position.integral_time": 30.0}), math.inf, 30.0),
+])  # fmt: skip
+def test_what_a_slow_integral_leaves_of_a_reversal(design: model.Design, T: float, U: float) -> None:
+    """Of one or two, however slow beside the triangle; the loop's own lag moves the passage by about 1/Kv."""
+    static, slow = threshold(design := quiet(design), 0.0).static, assemble_loops(design)
+    loop = hysteresis(design, 0.0, static, linear_steady_state(slow, np.array([1.0])).settling_ticks)
+    within = 3.0 / design.controller.position.gain / min(T, U)
+    assert loop.lost_motion_rad == pytest.approx(loop.predicted_rad, rel=within)
+
+
+@pytest.mark.parametrize("T", [1.0, 10.0, 100.0, 1e4])
+def test_an_orbit_of_short_stands_has_a_closed_form(T: float) -> None:
+    """e + z/T = F + g t turns over at once: F/cosh(P/4T) + g T (1 - 1/cosh(P/4T))."""
+    F, g, P = 2.0, 3e-3, 40.0
+    fast = Orbit(F, F, g, 1e8, 0.5 * P, np.array([1.0 / T, 0.0]))
+    left = 1.0 / math.cosh(0.25 * P / T)
+    assert fast.at_zero_rad == pytest.approx(F * left + g * T * (1.0 - left), rel=1e-6)
+    alone = replace(fast, gains=np.zeros(2), rate_rad_s=1.0, breakaway_rad=2.5, growth_rad_s=0.0)
+    assert alone._stand_s() == pytest.approx(F + 2.5, rel=1e-12)
+    assert alone.at_zero_rad == pytest.approx(F, rel=1e-12)
+    assert replace(alone, rate_rad_s=0.1).at_zero_rad == 0.0  # the command turns before it breaks away
+
+
+def test_a_width_is_that_of_the_periodic_state() -> None:
+    passing = np.array([(-1.0) ** k * 0.35 + 0.2 * 0.8**k for k in range(3)])
+    assert _width(passing) == pytest.approx(0.7, rel=1e-12)
+    assert _width(np.array([1.5, 0.5, 1.5])) == 1.0  # about a middle
 
 
 def test_the_error_that_stays_of_a_force_source_is_less_than_its_threshold() -> None:

@@ -30,7 +30,7 @@ from analyses.large_signal.result import ROUNDS, limit_shift
 from analyses.linear.loop_figures import all_loop_figures
 from analyses.validation.places import Bench
 from nonlinear import commands, simulate
-from reports.sections.large_signal import _result
+from reports.sections.large_signal import _result, _sawtooth
 from reports.sections.names import output_unit
 from tests.changed import changed
 from tests.nonlinear.elastic_drive import drive_f, stribeck
@@ -92,6 +92,11 @@ def test_the_baseline_reverses_too_slowly_for_the_lag() -> None:
     for run in result.runs:
         assert abs(run.gain_error) < 0.01
         assert 5.0 < run.lag_error_deg < result.reversal_deg
+    unit = output_unit(AMBER)
+    assert "the output becomes a sawtooth" in _sawtooth(result, unit, "N m")["caption"]
+    slow = sawtooth(with_values(AMBER, {"limits.acceleration": 2500.0}))
+    assert slow.reversal_deg > 180.0
+    assert "no sawtooth" in _sawtooth(slow, unit, "N m")["caption"]
 
 
 @pytest.mark.parametrize(("name", "changed", "asked", "word"), [
@@ -295,6 +300,14 @@ def test_what_the_map_shows(amber_map: AmplitudeMap) -> None:
     assert abs(np.degrees(np.angle(changed))) < 2.0
     assert amber_map.share("speed", "current", "acceleration") > 0.3
     assert "parabola" in {WAVEFORMS[k] for k in waveform.ravel()}
+
+
+def test_a_phase_is_unwrapped_from_the_linear_one(amber_map: AmplitudeMap) -> None:
+    """179 deg ahead at the lowest frequency is 181 deg behind: no -90 deg to be crossed above it."""
+    late = replace(amber_map, response=np.tile(amber_map.linear * np.exp(-3.13j), (2, 1)))
+    wanted = np.degrees(np.unwrap(np.angle(amber_map.linear)) - 3.13)
+    assert np.angle(late.response[0, 0]) > 0.0
+    assert late.phase_deg == pytest.approx(np.tile(wanted, (2, 1)), abs=1e-9)
 
 
 def test_limits_act_above_the_lowest_line_only(amber_map: AmplitudeMap) -> None:

@@ -91,6 +91,17 @@ def test_a_sine_within_the_limits_needs_the_current_of_its_friction(amber: Speci
     assert move.rms_current_A == pytest.approx(by_hand, rel=0.01)
 
 
+def test_the_peak_rate_of_a_load_behind_a_spring_is_its_own() -> None:
+    """The load of the fin leaves its play a third faster than the motor turns."""
+    step = specification(FIN).steps[-1]
+    run = simulate(FIN, commands.step(step.amplitude_rad), 0.3, step.load_Nm)
+    rates = [
+        np.abs(np.diff(y)).max() / run.period_s for y in (run.output_angle_rad, run.motor_angle_rad / 60.0)
+    ]
+    assert step.peak_rate_rad_s == pytest.approx(rates[0], rel=0.01)
+    assert rates[0] > 1.3 * rates[1]
+
+
 def test_step_times(amber: Specification) -> None:
     """A small step takes the linear time; a large one the rate limit: 0.8 A/R from 10 to 90 %."""
     for load in (0.0, 8.0):
@@ -150,6 +161,21 @@ def test_a_hunting_drive_fails_its_verdict() -> None:
     assert made["status"] == "fail"
     items = next(block["items"] for block in made["blocks"] if block["kind"] == "verdicts")
     assert any(item["verdict"] == Verdict.NOT_MET and "refuted" in item["reason"] for item in items)
+
+
+def test_a_p_current_loop_bounds_the_plane_where_the_drive_has_its_top_speed() -> None:
+    """(Kp + R) i = Kp i_peak - kE w: there steady motion takes all of it."""
+    slow = {"current": {"gain_V_A": 0.05, "integral_time_s": None}}
+    design = changed(AMBER, controller=slow, limits={"speed_rad_s": 2e3}, validation={"loads_Nm": (1.0,)})
+    found, motor = drive_figures(design, 1.0), design.effective_motor
+    top = found.output_rate_rad_s * design.total_ratio
+    plane = torque_speed_plane(design, top)
+    (bound,) = (curve for curve in plane.bounds if curve.name == "peak current")
+    R, kM = motor.resistance_ohm, motor.torque_constant_Nm_A
+    peak = design.limits.peak_current_A
+    assert bound.torque_Nm[0] == pytest.approx(kM * 0.05 * peak / (0.05 + R))
+    there, taken = (np.interp(top, one.speed_rad_s, one.torque_Nm) for one in (bound, plane.demands[0]))
+    assert there == pytest.approx(taken, rel=1e-9)
 
 
 @pytest.mark.parametrize("name", UNDER_LOAD)

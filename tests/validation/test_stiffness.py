@@ -19,6 +19,8 @@ from actuator_lti.loops import assemble_loops
 from actuator_lti.loops.stiffness import compliance, lost_motion_rad, stiffness_at
 from analyses.stiffness import check_stiffness, stiffness, stiffness_at_rest, stiffness_curves
 from analyses.stiffness.run import lost_motion_seen
+from nonlinear import commands, simulate
+from nonlinear.loads import series
 from reports.charts.svg import draw_svg
 from reports.sections.stiffness import section
 from tests.changed import changed
@@ -161,6 +163,19 @@ def test_at_rest_a_slow_integral_is_waited_for() -> None:
     )
     (result,), (check,) = stiffness_at_rest(design, [(20.0, 1.0)]), check_stiffness(design, (20.0,))
     assert result.seen_Nm_rad == pytest.approx(check.foreseen_Nm_rad, rel=1e-4)
+
+
+def test_at_rest_a_drive_that_hunts_has_no_stiffness_of_its_own() -> None:
+    """A second integral makes the joint stick and slip: under 6 N m each period of the load is another."""
+    design = changed(load_design("joint"), controller={"velocity": {"integral_time_s": 0.02}})
+    (hunts,), (moves,) = (stiffness_at_rest(design, [(2.0, moment)]) for moment in (6.0, 20.0))
+    t = np.arange(0.0, 10.0, design.controller.period_s)
+    for moment, found in ((6.0, hunts), (20.0, moves)):
+        load = series(t, moment * np.sin(4.0 * np.pi * t))
+        y = simulate(design, commands.hold(), t.size * design.controller.period_s, load).output_angle_rad
+        seen = np.abs((y.reshape(20, -1) @ np.exp(-2j * np.pi * np.arange(8000) / 8000))[-4:])
+        assert np.isnan(found.seen_Nm_rad) == (np.ptp(seen) > 0.02 * seen.max())
+    assert np.isnan(hunts.seen_Nm_rad)
 
 
 @pytest.mark.parametrize("mass", [0.0, 1.0])
