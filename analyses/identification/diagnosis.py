@@ -35,6 +35,7 @@ LEAST_RUN = 3  # samples in a row at the largest or smallest value of all: a fla
 ROUNDS = 8
 SETTLED = 0.1
 LARGEST_STEP_S = 0.01
+MOTIONS = {"angle", "output_angle", "speed", "position", "velocity"}
 
 
 @dataclass(frozen=True)
@@ -85,7 +86,7 @@ def diagnosed(
             late = max(late, lag.within_s)
             if lag.is_sure:
                 sure.append(lag)
-                used[k] = shifted(start, record, lag.seconds)
+                used[k] = in_time(start, record, like, lag.seconds)
     if sure:
         before, model = model, fit(used)
         if before.names == model.names:
@@ -209,6 +210,20 @@ def shifted(design: Design, record: Record, seconds: float) -> Record:
     name = drive_of(design, record)[1]
     moved = np.interp(record.time_s + seconds, record.time_s, record[name])
     return replace(record, signals={**record.signals, name: moved})
+
+
+def in_time(design: Design, record: Record, like: Record, late_s: float) -> Record:
+    """A record with its drive signal earlier by so much, or its motion later: as a simulated one has both."""
+    times = record.time_s - late_s
+    moved = {name: np.interp(times, record.time_s, record[name]) for name in MOTIONS & record.signals.keys()}
+    ways = shifted(design, record, late_s), replace(record, signals={**record.signals, **moved})
+
+    def off(one: Record) -> float:
+        names = (MOTIONS | {drive_of(design, record)[1]}) & one.signals.keys() & like.signals.keys()
+        misses = {name: one[name][: len(like)] - like[name] for name in names}
+        return sum(float(np.var(each)) / max(float(np.var(like[n])), 1e-300) for n, each in misses.items())
+
+    return min(ways, key=off)
 
 
 def lag_of(design: Design, record: Record, simulated: Record, model: JointModel) -> Lag | None:

@@ -145,9 +145,12 @@ def noise_items(model: JointModel) -> Iterator[Item]:
 
 
 def kept_items(fit: Fit, held: Collection[str], axis: str = "rotary") -> Iterator[Item]:
-    """What the records neither confirm nor deny: the design's values, but for those held as asked."""
+    """What the records neither confirm nor deny: the design's values, but for those held as asked.
+
+    One of 0 that moves no other value is none of the drive; a ``gravity_cos`` of 0 is the design's offset.
+    """
     for name, kept in fit.fixed.items():
-        if (kept.value or name == "gravity_cos") and name not in held:  # 0: the design's offset
+        if (kept.value or kept.moves or name == "gravity_cos") and name not in held:
             yield Item.unproven(f"kept-{name}", parameter(name, axis).label, kept.reason)
 
 

@@ -6,6 +6,7 @@ from math import copysign
 import numpy as np
 import pytest
 from scipy.linalg import expm
+from scipy.signal import lfilter
 
 from actuator_lti.design import read_design_text, with_values
 from actuator_lti.design.model import Design
@@ -201,3 +202,41 @@ def test_a_run_is_known_between_its_ticks() -> None:
     for name, values in truth.items():
         assert seen[name] == pytest.approx(values[part], abs=1e-11 * np.ptp(values)), name
     assert np.array_equal(seen["voltage"], np.repeat(volts[1:], coarse)[: len(seen["voltage"])])
+
+
+SPINDLE = """design = { name = "spindle" }
+limits = { voltage = "300 V", peak_current = "30 A" }
+friction = { dry_torque = "0.2 N*m", viscous = "1 mN*m*s/rad" }
+load = { path = "back-drivable" }
+encoder = { speed = "ideal" }
+[motor]
+resistance = "0.8 ohm"
+inductance = "2 mH"
+torque_constant = "0.3 N*m/A"
+back_emf_constant = "0.3 V*s/rad"
+rotor_inertia = "15 kg*cm^2"
+[control]
+period = "0.1 ms"
+computing_delay = "0.1 ms"
+current = { gain = "5 V/A", integral_time = "2.5 ms" }
+velocity = { gain = "1.2 A*s/rad", integral_time = "30 ms", every = 2 }
+"""
+
+
+@pytest.mark.parametrize("filter_s", [1e-3, 4e-3])
+def test_a_speed_behind_a_filter_is_late_and_no_command_held(filter_s: float) -> None:
+    """A row every 2 ms: a command held for as long would be late by 1 ms, and the current with it."""
+    design, rng = read_design_text(SPINDLE), np.random.default_rng(1)
+    run = simulate(design, commands.multisine(100.0, [0.5, 1.5, 4.0], 6.0, 1e-4, seed=2), 6.0)
+    keep = filter_s / (1e-4 + filter_s)
+    speed = lfilter([1.0 - keep], [1.0, -keep], run.motor_speed_rad_s)[::20]
+    noise = {
+        "speed": 0.1 * rng.standard_normal(len(speed)),
+        "current": 0.02 * rng.standard_normal(len(speed)),
+    }
+    seen = {"speed": speed + noise["speed"], "current": run.current_A[::20] + noise["current"]}
+    record = record_of(run.time_s[::20], output_speed_reference=run.reference_rad[::20], **seen)
+    result = identify_bench(design, [record])
+    truth = {"inertia": 15e-4, "viscous": 1e-3, "dry": 0.2}
+    assert result.passed
+    assert errors_off(result.model, truth) < 4.0

@@ -15,8 +15,9 @@ from analyses.identification.inverse import fit_records
 from analyses.identification.joint_model import JointModel
 from analyses.identification.motion_noise import with_noise_of_motion
 from analyses.identification.rows import stands
-from analyses.identification.verdict import law_items, noise_items
+from analyses.identification.verdict import kept_items, law_items, noise_items
 from analyses.records.differentiation import low_pass
+from tests.changed import changed
 from tests.identification.bench_records import record_of
 from tests.refusals import refused
 
@@ -200,6 +201,17 @@ def test_noise_behind_a_filter_is_no_motion(corner_hz: float, moves: float) -> N
     )
     logged = moves * speed + 2e-4 * noise / np.std(noise)
     assert stands(design, record_of(time, velocity=logged, force=force)) is (moves == 0.0)
+
+
+def test_an_offset_that_one_direction_does_not_tell_is_not_proven() -> None:
+    """It is in the dry friction then, which is as sure as if there were none."""
+    design, (time, _, speed, acceleration) = load_design("emps"), _sines(np.random.default_rng(0), 4000)
+    speed = speed + 2.0 * np.max(np.abs(speed))
+    design = changed(design, friction={"offset_torque_Nm": 0.0})
+    force = MASS * acceleration + VISCOUS * speed + DRY + OFFSET
+    model = fit_records(design, [record_of(time, velocity=speed, force=force)])
+    assert model["dry"] == pytest.approx(DRY + OFFSET, rel=1e-3)
+    assert [item.id for item in kept_items(model, ())] == ["kept-offset"]
 
 
 @pytest.mark.parametrize("place", ["velocity", "position"])
