@@ -57,11 +57,13 @@ def loop_column(design: Design, loop: str, quantity: str) -> str:
 def loop_columns(
     linear: LinearFigures, design: Design, quantities: Iterable[str] = LOOP_QUANTITIES
 ) -> dict[str, np.ndarray]:
-    """Columns of the loops of many designs: whether each is stable (1 or 0), and figures of it."""
+    """Columns of the loops of many designs: whether each is stable (1 or 0), and its figures, NaN if not."""
     columns: dict[str, np.ndarray] = {}
     for loop in linear.loops:
-        columns[f"{loop}.stable"] = linear.stable(loop).astype(float)
-        columns |= {loop_column(design, loop, name): linear.quantity(name, loop) for name in quantities}
+        stable = linear.stable(loop)
+        columns[f"{loop}.stable"] = stable.astype(float)
+        for name in quantities:
+            columns[loop_column(design, loop, name)] = np.where(stable, linear.quantity(name, loop), np.nan)
     return columns
 
 
@@ -114,9 +116,6 @@ def judge(requirement: Requirement, design: Design, columns: Columns) -> Judged:
         values = np.abs(values)  # a margin counts in either direction
     distances = requirement.distance(values)
     distances[np.isnan(values)] = -np.inf
-    for k, name in enumerate(names):
-        if (stable := columns.get(f"{name.partition('.')[0]}.stable")) is not None:
-            distances[k, stable != 1.0] = -np.inf
     worst, places = np.argmin(distances, axis=0), np.arange(values.shape[1])
     distance = distances[worst, places]
     return Judged(values[worst, places], distance, distance >= 0.0)

@@ -314,3 +314,5 @@ def test_drives_that_are_not_stable_do_not_pass_whatever_is_required(tmp_path) -
         result = monte_carlo(design, tmp_path / gain[:3].strip(), replace(PLAIN, samples=60))
         assert result.verdict == verdict
         assert words in brief(result).words
+        missing = [result.columns[f"{loop}.gain_margin"].missing for loop in ("velocity", "position")]
+        assert missing == [0, 60 if words else 0]  # it has no margins, as `margins` says of one design
