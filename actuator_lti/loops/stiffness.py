@@ -31,9 +31,9 @@ BELOW_NYQUIST = 0.45  # of the sampling rate: at 0.5 a held moment does not move
 LOST_MOTION_SHARE = 0.03  # of the rated moment
 _AROUND = np.linspace(-1.0, 1.0, 17)  # of the spacing of the frequencies, a quarter as wide every round
 _ROUNDS = 12
-# Where the limit at zero frequency is read, above the rounding of a pole there that no load moves (that of a
-# speed drive, whose integral holds the angle); its slope
-_REST_HZ, _SLOW_HZ = 1e-9, 1e-5
+# Where the limit at zero frequency is decided on; is read (and at twice that), above the rounding of a pole
+# there that no load moves (that of a speed drive, whose integral holds the angle); its slope
+_REST_HZ, _READ_HZ, _SLOW_HZ = 1e-9, 1e-8, 1e-5
 _AWAY = 1e-3  # of the stiffness at `_SLOW_HZ` is left at `_REST_HZ`: 1e-4 by one free integration
 
 
@@ -123,12 +123,15 @@ def stiffness_at(response: Compliance, frequency_hz: npt.ArrayLike) -> npt.NDArr
 
 def static_stiffness(response: Compliance) -> Any:
     """K at zero frequency, by its slope near there: below 0 of a drive that pushes away, 0 of a free one, inf
-    with an integral.
+    with an integral; the real part, whose next term is in the square of the frequency.
     """
-    K = np.moveaxis(stiffness_at(response, [_REST_HZ, _SLOW_HZ, 10.0 * _SLOW_HZ]), -1, 0)
-    rest, low, high = np.abs(K)
+    hertz = [_REST_HZ, _SLOW_HZ, 10.0 * _SLOW_HZ, _READ_HZ, 2.0 * _READ_HZ]
+    K = np.moveaxis(stiffness_at(response, hertz), -1, 0)
+    (rest, low, high), (once, twice) = np.abs(K[:3]), K[3:].real
     gone = ~np.isfinite(low) | (high < 0.5 * low)
-    return _plain(np.where(gone, np.inf, np.where(rest < _AWAY * low, 0.0, np.copysign(rest, K[0].real))))
+    free = rest < _AWAY * low
+    with np.errstate(invalid="ignore"):  # inf less inf, which is gone
+        return _plain(np.where(gone, np.inf, np.where(free, 0.0, (4.0 * once - twice) / 3.0)))
 
 
 def lost_motion_rad(design: Design) -> Any:

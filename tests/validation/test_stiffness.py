@@ -103,7 +103,7 @@ def test_a_speed_drive_holds_by_the_integral_of_its_speed(name: str) -> None:
     compliance_rad_Nm = velocity.integral_time_s / (kM * velocity.gain * design.total_ratio**2)
     spring = 0.0 if design.coupling is None else 1.0 / design.coupling.stiffness_Nm_rad
     found = drive_figure(design, "static_stiffness")
-    assert found == pytest.approx(1.0 / (compliance_rad_Nm + spring), rel=3e-7)
+    assert found == pytest.approx(1.0 / (compliance_rad_Nm + spring), rel=1e-9)
 
 
 def test_an_integral_on_the_output_comes_back_and_a_self_locking_gear_does_not_move() -> None:
