@@ -62,11 +62,8 @@ def hysteresis(design: Design, load_Nm: float, static: StaticThreshold, settling
         for drive, friction_on in ((tight, False), (design, True))
     )
     smooth = linear.output_angle_rad[updates // 2 :]  # from the first fall of the command through zero on
-    lost, shown = (
-        run.output_angle_rad[updates // 2 :] - smooth,
-        slice(-updates, None, max(1, updates // POINTS)),
-    )
-    linear_width = _width(smooth[:: updates // 2])
+    lost = run.output_angle_rad[updates // 2 :] - smooth
+    linear_width, shown = _width(smooth[:: updates // 2]), slice(-updates, None, max(1, updates // POINTS))
     return Hysteresis(
         amplitude, 1.0 / period, run.reference_rad[shown], run.output_angle_rad[shown],
         linear_width + _width(lost[:: updates // 2]), linear_width, float(np.abs(lost).max()),

@@ -9,7 +9,7 @@ from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError, NumericalError
 from actuator_lti.types import Floats, Mask
 from analyses.correlation.closed_loop import with_zero
-from analyses.correlation.following import Followed, followed
+from analyses.correlation.following import PLACES, Followed, followed
 from analyses.estimation.least_squares import covariance_of, independent, information_of, solve, told_apart
 from analyses.estimation.parameters import Parameter, parameter
 from analyses.estimation.series import correlation_time
@@ -27,7 +27,7 @@ from analyses.identification.rows import (
     rows_under,
 )
 from analyses.records.consistency import ALIKE, SURE, Finding, clock_doubt, resistance_doubt
-from analyses.records.naming import KNOWN_UNITS
+from analyses.records.naming import KNOWN_UNITS, RATES
 from analyses.records.record import Record, lasting
 
 Fitting = Callable[[Sequence[Record]], JointModel]
@@ -35,7 +35,6 @@ LEAST_RUN = 3  # samples in a row at the largest or smallest value of all: a fla
 ROUNDS = 8
 SETTLED = 0.1
 LARGEST_STEP_S = 0.01
-MOTIONS = {"angle", "output_angle", "speed", "position", "velocity"}
 
 
 @dataclass(frozen=True)
@@ -214,12 +213,13 @@ def shifted(design: Design, record: Record, seconds: float) -> Record:
 
 def in_time(design: Design, record: Record, like: Record, late_s: float) -> Record:
     """A record with its drive signal earlier by so much, or its motion later: as a simulated one has both."""
-    times = record.time_s - late_s
-    moved = {name: np.interp(times, record.time_s, record[name]) for name in MOTIONS & record.signals.keys()}
+    times, motions = record.time_s - late_s, (*PLACES, RATES[design.axis])
+    moved = {n: np.interp(times, record.time_s, record[n]) for n in motions if n in record.signals}
     ways = shifted(design, record, late_s), replace(record, signals={**record.signals, **moved})
+    drive = drive_of(design, record)[1]
 
     def off(one: Record) -> float:
-        names = (MOTIONS | {drive_of(design, record)[1]}) & one.signals.keys() & like.signals.keys()
+        names = [n for n in (*motions, drive) if n in one.signals and n in like.signals]
         misses = {name: one[name][: len(like)] - like[name] for name in names}
         return sum(float(np.var(each)) / max(float(np.var(like[n])), 1e-300) for n, each in misses.items())
 

@@ -497,9 +497,8 @@ def _counted(
     kelvin = (ratio - 1.0) / COPPER_1_K
     warm = name == "R i" and WINDING_K[0] < kelvin < WINDING_K[1]
     if warm:
-        text += (
-            f": a winding {kelvin:+.0f} K from the design's, or a current {1.0 / ratio:.3g} times the real"
-        )
+        text += f": a winding {kelvin:+.0f} K from the design's, "
+        text += f"or a current {1.0 / ratio:.3g} times the real"
     return (None if warm else False), with_factor(text, 1.0 / ratio if ratio > 0.0 else 0.0)
 
 
@@ -513,12 +512,9 @@ def _load(design: Design, record: Record) -> Finding | None:
         share, alike = ratio_of(load, ratio * torque)
         if alike > ALIKE and abs(share - 1.0) <= SURE * own_share(design, "motor.torque_constant"):
             words = "kM i" if ratio == 1.0 else "kM i and the reduction"
-            told = (
-                f"the {name} is {share:.4g} times {words}: the drive's own (leave the column out), or a load "
-            )
-            return Finding(
-                "load against the current", False, f"{told}of turned sign: positive drives forward"
-            )
+            told = f"the {name} is {share:.4g} times {words}: the drive's own (leave the column out), "
+            told += "or a load of turned sign: positive drives forward"
+            return Finding("load against the current", False, told)
     return None
 
 

@@ -162,10 +162,8 @@ def _as_set(design: Design, settings: tuple[tuple[str, str | float], ...]) -> De
 def check_error(error: float, tolerance: float, note: str, where: str) -> None:
     """Refuse what straight lines between samples would do to a signal."""
     if error > tolerance:
-        allowed = (
-            f"allowed: {100.0 * tolerance:g} % (resample_tolerance of a record file); of a pause, a file "
-        )
-        allowed += "for each part"
+        allowed = f"allowed: {100.0 * tolerance:g} % (resample_tolerance of a record file); "
+        allowed += "of a pause, a file for each part"
         raise InputError(f"{note}; {allowed}", where=where)
 
 
