@@ -157,8 +157,8 @@ class Loops:
         """Command at the output shaft to output angle, feed-forward included, as a python-control system.
 
         The command is that behind the mean which limits its jerk (`actuator_lti.drive.profile`), before its
-        filter. Of a speed drive the command to the motor's speed, of a torque drive to its current, of a voltage
-        drive to the motor's speed. None with the rotor locked.
+        filter. Of a speed drive the command to the motor's speed, of a torque drive to its current, of a
+        voltage drive to the motor's speed. None with the rotor locked.
         """
         return as_control(self.plain_response)
 
