@@ -96,6 +96,7 @@ class Design:
     description: Annotated[str, text("what the drive is and where its figures come from")] = ""
     origin: str = ""
     written: frozenset[str] = field(default=frozenset(), compare=False)  # keys that stand in its file
+    nominal: "Design | None" = None  # what the controller of a drive that came out otherwise is set for
 
     def with_values(self, values: Mapping[str, Any]) -> "Design":
         """A copy with some keys changed, as a design file would write them.
@@ -230,6 +231,11 @@ class Design:
         """J_l, all inertia behind the coupling, at its own shaft; rigid: the load's, at the output."""
         behind = self.gears[self.gears_before_coupling :]
         return _train_inertia(behind) + self.load.inertia_kgm2 / self.ratio_behind_coupling**2
+
+    @cached_property
+    def controller_model(self) -> "Design":
+        """The drive whose J, kM, R and kE feed-forward computes with: the nominal one of its data sheet."""
+        return replace(self if self.nominal is None else self.nominal, temperature=None)
 
     @cached_property
     def effective_motor(self) -> Motor:

@@ -13,10 +13,10 @@ from typing import Any
 import numpy as np
 
 from actuator_lti.bounds import SAMPLES
-from actuator_lti.design import with_values, write_design
+from actuator_lti.design import write_design
+from actuator_lti.design.access import varied
 from actuator_lti.design.loader import AnyDesign, as_design
 from actuator_lti.design.model import Design, Requirement
-from actuator_lti.design.tolerances import together
 from actuator_lti.drive.operating import OperatingPoint
 from actuator_lti.errors import InputError
 from actuator_lti.files.atomic import write_bytes
@@ -191,7 +191,7 @@ def _worst_cases(
         case = worst_case(task.of(requirement), requirement, samples)
         name = f"worst-{place:02d}-{slug(requirement.id)}"
         title = f"{design.title or design.name}: worst case for {requirement.id}"
-        changed = with_values(design, together(design, case.parameters), check=False)
+        changed = varied(design, case.parameters)
         titled = replace(changed, name=f"{slug(design.name)}-{name}", title=title)
         path = folder / f"{name}.toml"
         write_bytes(path, write_design(titled).encode())
