@@ -3,8 +3,8 @@
 A limit takes gain away, under which a loop with a lower gain margin goes unstable. The describing function of
 saturation says from which amplitude in front of the limit on an oscillation grows; whether the drive gets
 there is found in time, by steps of growing size. It knows nothing of anti-windup (model.md section 2), with
-which the drive is safer. A voltage limit behind a current loop is taken as the command of the current U/R: the
-velocity controller does not know of it and goes on integrating.
+which the drive is safer. A voltage limit behind a current loop is taken as the command of the current U/R:
+the velocity controller does not know of it and goes on integrating.
 """
 
 from dataclasses import dataclass

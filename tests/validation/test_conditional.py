@@ -84,7 +84,7 @@ def test_it_goes_away_with_the_limit_or_with_knowledge_of_it() -> None:
 
 
 def test_a_current_loop_without_an_integral_is_asked_for_more_than_flows() -> None:
-    """P loop of R/2: i = i_ref/3. U/R = 12 A of the winding takes i_ref = 36 A, so a limit of 20 A acts first."""
+    """P loop of R/2: i = i_ref/3. U/R = 12 A takes i_ref = 36 A, so a limit of 20 A acts first."""
     current = {"gain_V_A": 0.5, "integral_time_s": None}
     loops = {"current": current, "velocity": {"gain": 3.0 * DESIGN.controller.velocity.gain}}
     for most, limit, name in ((inf, 36.0, "voltage limit as a current, U/R"), (20.0, 20.0, "current limit")):
