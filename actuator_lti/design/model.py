@@ -96,6 +96,7 @@ class Design:
     description: Annotated[str, text("what the drive is and where its figures come from")] = ""
     origin: str = ""
     written: frozenset[str] = field(default=frozenset(), compare=False)  # keys that stand in its file
+    nominal: "Design | None" = None  # what the controller of a drive that came out otherwise is set for
 
     def with_values(self, values: Mapping[str, Any]) -> "Design":
         """A copy with some keys changed, as a design file would write them.
@@ -235,6 +236,11 @@ class Design:
     def dc_of_sheet(self) -> dict[str, float]:
         """R, L, kM and kE of the equivalent DC motor over those of the data sheet, by attribute."""
         return _EQUIVALENT[self.motor.constants]
+
+    @cached_property
+    def controller_model(self) -> "Design":
+        """The drive whose J, kM, R and kE feed-forward computes with: the nominal one of its data sheet."""
+        return replace(self if self.nominal is None else self.nominal, temperature=None)
 
     @cached_property
     def effective_motor(self) -> Motor:
