@@ -182,7 +182,7 @@ def _table(data: bytes) -> tuple[dict[str, Floats], bool]:
 
 def _heading(above: list[list[str]]) -> list[str] | None:
     """The names above a table, each with what a row of units below them says; ``None``: there are none."""
-    *before, last = [[], *above]
+    before, last = above[:-1], above[-1] if above else []
     if before and column.are_units(last) and column.is_heading(before[-1]):
         units = [unit.strip("[]() ") for unit in last]
         return [f"{name} [{unit}]" if unit else name for name, unit in zip(before[-1], units, strict=True)]
