@@ -84,7 +84,7 @@ class Frame:
             else:
                 return self._said(text, field, unit, value)
             if (turned := _turned(field.path, text, one)) is not None:
-                line = field.section == "motor" and self.constants == "peak-phase"
+                line = field.key == "back_emf_constant" and self.constants == "peak-phase"
                 return turned * factor / (sqrt(3.0) if line else 1.0)
         refused = [one for one in refused if isinstance(one, AdvisedError)] or refused
         raise refused[-1 if field.section in ("load", "command", "validation") else 0]

@@ -17,9 +17,12 @@ from actuator_lti.design import (
     with_values,
     write_design,
 )
+from actuator_lti.design.field import Structure
+from actuator_lti.design.fields import FIELDS
 from actuator_lti.design.key_reference import explained
 from actuator_lti.design.loader import design_from_tree
 from actuator_lti.design.model import Gear
+from actuator_lti.design.stated import Frame
 from actuator_lti.design.writing import read_value, value_as_stated
 from actuator_lti.drive.facts import capability, steady_torque_Nm
 from actuator_lti.drive.sheet_figures import sheet_figures
@@ -256,8 +259,10 @@ def test_periods_of_cogging_are_those_of_a_revolution_or_of_a_magnet_pitch() -> 
     # a bare number is per revolution of a rotary motor behind a screw, as its sheet has it
     motor = with_overrides(screw, {"motor.cogging_periods": 20, "motor.cogging": "1 mN*m"}).motor
     assert motor.cogging_periods == pytest.approx(20 / screw.screw.travel_m_rad, rel=1e-14)
-    motor = with_overrides(emps, {"motor.cogging_periods": "24 mm"}).motor
-    assert motor.cogging_periods == pytest.approx(2 * pi / 0.024, rel=1e-14)
+    for constants in ("dc", "rms-line", "peak-phase"):  # a pitch has no convention
+        frame = Frame(Structure.of(emps), constants)
+        periods = frame.quantity("24 mm", FIELDS["motor.cogging_periods"])
+        assert periods == pytest.approx(2 * pi / 0.024, rel=1e-14)
     with pytest.raises(InputError, match=r"cogging_periods.*wrong dimension"):
         with_overrides(AMBER, {"motor.cogging_periods": "24 mm"})
 
