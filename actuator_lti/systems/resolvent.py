@@ -38,11 +38,11 @@ def _by_schur_form(A: np.ndarray, right: np.ndarray, points: np.ndarray) -> np.n
     T, Q = schur(A, output="complex")
 
     def solved(wanted: np.ndarray) -> np.ndarray:
-        x = Q.conj().T @ wanted
+        x = np.tensordot(Q.conj().T, wanted, (1, 1))  # states first: a row of all points is one product
         for row in reversed(range(len(A))):
-            x[:, row] += (T[row, None, row + 1 :] @ x[:, row + 1 :])[:, 0]
-            x[:, row] /= (points - T[row, row])[:, None]
-        return np.asarray(Q @ x)
+            x[row] += np.tensordot(T[row, row + 1 :], x[row + 1 :], 1)
+            x[row] /= (points - T[row, row])[:, None]
+        return np.tensordot(Q, x, 1).transpose(1, 0, 2)
 
     with np.errstate(divide="ignore", invalid="ignore"):  # at a pole
         found = solved(right)

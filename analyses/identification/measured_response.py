@@ -11,7 +11,6 @@ from scipy.stats import chi2
 from actuator_lti.design import parameter_value, paths_of, read_design_text, with_values, write_design
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
-from actuator_lti.files.response import RecordedResponse, read_response
 from actuator_lti.types import Complexes, Progress
 from analyses.estimation.fit import Fit, Fixed
 from analyses.estimation.least_squares import scaled_lstsq
@@ -24,6 +23,7 @@ from analyses.identification.response_search import STEP
 from analyses.identification.to_design import design_with_fit, with_correlations
 from analyses.identification.verdict import Identified, Item, kept_items, simulated_item
 from analyses.records.consistency import NO_CHANCE, SURE
+from analyses.records.response import RecordedResponse, read_response
 from analyses.studies.sampling import correlation_of
 
 KEYS = (
@@ -66,7 +66,7 @@ def identify_response(
     the response does not determine: a standard error above the design's value, and above a quarter of what it
     is off; of a stiffness, or of one of several inertias, no end of its interval within a factor of 30.
 
-    ``source``: as `actuator_lti.files.response.read_response` takes it. ``loop``: a stage (``"position"``) or
+    ``source``: as `analyses.records.response.read_response` takes it. ``loop``: a stage (``"position"``) or
     a break point (``"w_ref"``); the outermost stage by default. ``of``: open loop, L/(1 + L), 1/(1 + L), or
     (closed) from the command to the output with all that is fed forward. ``fixed``: keys held at a value.
     ``limit``: largest relative error of the design's response, root mean square over the frequencies.
@@ -77,10 +77,10 @@ def identify_response(
     """
     measured = read_response(source, averages)
     start = with_values(design, dict(fixed or {}))
-    model = loop_model(start, loop, of, measured)
+    model, grows = loop_model(start, loop, of, measured)
     known = bool(np.all(np.isfinite(measured.deviation) & (measured.deviation > 0.0)))
     size = np.abs(measured.response) * (measured.deviation / np.sqrt(2.0) if known else 1.0)
-    seen = Seen(measured=measured.response, size=size, known=known, model=model)
+    seen = Seen(measured=measured.response, size=size, known=known, model=model, grows=grows)
     held = {key: Fixed(value=value, reason="fixed as asked") for key, value in (fixed or {}).items()}
     if start.load.inertia_kgm2 == 0.0:
         held.setdefault("load.inertia", Fixed(value=0.0, reason="0 in the design: kept"))
@@ -102,7 +102,7 @@ def identify_response(
     made = _written(start, fit, given, f"frequency response {measured.name}{constant}")
     given |= {key: _told(start, key, given[key]) for key in hanging}
     fit = replace(fit, covariance=fit.joint, fixed={**held, **fit.fixed, **given})
-    modelled = loop_model(read_design_text(write_design(made)), loop, of, measured)({})[0]
+    modelled = loop_model(read_design_text(write_design(made)), loop, of, measured)[0]({})[0]
     error = float(np.sqrt(np.mean(np.abs(modelled / measured.response - 1.0) ** 2)))
     items = [simulated_item(measured.name, error, limit, "its response, rms over the frequencies")]
     if fit.misfit is not None:
@@ -112,6 +112,9 @@ def identify_response(
         items.insert(0, Item.of("misfit", label, "" if level > NO_CHANCE else why))
     ended = "it ended at the least or largest value of its key: the response wants another"
     items += [Item.of(f"bound-{key}", f"{key} is within what its key allows", ended) for key in fit.at_bound]
+    if grows({key: np.array([value]) for key, value in zip(fit.names, fit.values, strict=True)})[0]:
+        told = "what was closed while it was measured is not stable with these values: another drive"
+        items.append(Item.of("stable", "The drive that was found can be measured", told))
     if fit.also:
         told = ", ".join(f"{key} = {value:.4g}" for key, value in fit.also.items())
         wrong = f"{told} (SI) explain it as well: hold one of them (--fix), or measure more frequencies"

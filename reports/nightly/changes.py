@@ -9,6 +9,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import compress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -95,11 +96,11 @@ class Columns:
 
     def compare(self, before: np.ndarray, after: np.ndarray) -> tuple[Change, ...]:
         """List every figure that moved beyond its tolerance, appeared or vanished; the worst first."""
-        allowed, changes = self.allowed(before, after), []
-        for k in np.flatnonzero(self.moved(before, after)):
-            of, old, new = self.figures[k], finite(before[k]), finite(after[k])
-            worse = _worse(of, old, new)
-            changes.append(Change(of.name, of.unit, of.kind, old, new, float(allowed[k]), worse))
+        changes, moved = [], self.moved(before, after)
+        far = (part.tolist() for part in (before, after, self.allowed(before, after)))
+        for of, was, now, allowed in compress(zip(self.figures, *far, strict=True), moved):
+            old, new = finite(was), finite(now)
+            changes.append(Change(of.name, of.unit, of.kind, old, new, allowed, _worse(of, old, new)))
         return tuple(sorted(changes, key=_order))
 
 
@@ -114,8 +115,8 @@ def _worse(figure: Figure, old: float | None, new: float | None) -> bool | None:
 
 def _order(change: Change) -> tuple[bool, bool, float, str]:
     """What got worse first, then verdicts, then what moved by most of its tolerances."""
-    known = change.delta is not None and change.tolerance > 0.0
-    far = abs(change.delta or 0.0) / change.tolerance if known else math.inf
+    delta = change.delta
+    far = abs(delta) / change.tolerance if delta is not None and change.tolerance > 0.0 else math.inf
     return not change.worse, change.kind != "verdict", -far, change.figure
 
 
@@ -139,7 +140,7 @@ class Between:
         note = f"{skipped} night(s) without a result before; compared with the last that has one"
         found = self._compare(before, result, note * bool(skipped))
         shown = found.changes[:SHOWN_CHANGES]  # only what a page shows is looked at for going to and fro
-        courses = self.history.matrix(past[-WINDOW:], [c.figure for c in shown]).T
+        courses = self.history.matrix(past[-WINDOW:], [c.figure for c in shown]).T.tolist()
         marked = [replace(c, flapping=flaps(x, c.tolerance)) for c, x in zip(shown, courses, strict=True)]
         return replace(found, changes=(*marked, *found.changes[SHOWN_CHANGES:]))
 

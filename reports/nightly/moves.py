@@ -10,6 +10,7 @@ import fnmatch
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -139,17 +140,15 @@ def change_points(values: np.ndarray, tolerance: float) -> tuple[ChangePoint, ..
     )
 
 
-def flaps(values: np.ndarray, tolerance: float) -> bool:
+def flaps(values: Sequence[float], tolerance: float) -> bool:
     """Whether a figure goes to and fro: within 14 nights twice or more back to where it was before.
 
-    >>> flaps(np.array([1.0, 2.0, 1.0, 2.0]), 0.1), flaps(np.array([1.0, 1.0, 2.0, 2.0]), 0.1)
+    >>> flaps([1.0, 2.0, 1.0, 2.0], 0.1), flaps([1.0, 1.0, 2.0, 2.0], 0.1)
     (True, False)
     """
-    x = values[np.isfinite(values)][-WINDOW:]
-    if len(x) < 4:
-        return False
-    levels = x[np.concatenate([[True], np.abs(np.diff(x)) > tolerance])]
-    return int(np.count_nonzero(np.abs(levels[2:] - levels[:-2]) <= tolerance)) >= RETURNS
+    x = [value for value in values if math.isfinite(value)][-WINDOW:]
+    levels = x[:1] + [new for old, new in pairwise(x) if abs(new - old) > tolerance]
+    return sum(abs(new - old) <= tolerance for old, new in zip(levels, levels[2:], strict=False)) >= RETURNS
 
 
 def missing_nights(starts: Sequence[str]) -> tuple[tuple[int, int], ...]:

@@ -136,7 +136,7 @@ def _add(
 ) -> None:  # fmt: skip
     skipped = max(len(values) - LOOK_BACK, 0)
     points = [replace(p, index=skipped + p.index) for p in change_points(values[skipped:], tolerance)]
-    to_and_fro = flaps(values, tolerance)
+    to_and_fro = flaps(values.tolist(), tolerance)
     moved = (points or to_and_fro) and len(course.charts) < MAX_CHARTS
     if figure.kind != "requirement" and not moved:
         course.steady.append(figure)

@@ -17,10 +17,11 @@ import traceback
 from collections import Counter
 from collections.abc import Callable, Iterator
 from functools import cache
+from multiprocessing.context import ForkProcess
 from pathlib import Path
 
-import distributed  # noqa: F401 - here, not in every child
-import pyarrow.parquet  # noqa: F401
+import pyarrow.parquet  # noqa: F401 - here, not in every child
+from distributed.cli import dask_scheduler, dask_worker
 
 from actuator_lti import NumericalError, load_design
 from analyses.comparison.variants import compare
@@ -64,11 +65,22 @@ def compared(folder: Path, engine: Engine) -> object:
 STUDIES: tuple[Callable[[Path, Engine], object], ...] = (kept, reduced, compared)
 
 
+class Forked(ForkProcess):
+    """A process of this one, used as `subprocess.Popen` is."""
+
+    wait = ForkProcess.join
+
+    def poll(self) -> int | None:
+        return self.exitcode
+
+
 class Cluster:
+    """A scheduler and its workers, each started as a program: from here, with an environment of its own."""
+
     def __init__(self, folder: Path) -> None:
         self.file, self.log = folder / "scheduler.json", folder / "cluster.log"
-        self.scheduler: subprocess.Popen[bytes] | None = None
-        self.workers: list[subprocess.Popen[bytes]] = []
+        self.scheduler: subprocess.Popen[bytes] | Forked | None = None
+        self.workers: list[subprocess.Popen[bytes] | Forked] = []
 
     def start(self, workers: int = 2) -> None:
         if self.scheduler is None:
@@ -92,11 +104,16 @@ class Cluster:
             return json.loads(self.file.read_text())["address"]
         return ""
 
-    def _process(self, environment: dict[str, str], kind: str, *words: str) -> subprocess.Popen[bytes]:
-        common = ("--no-dashboard", "--host", "127.0.0.1", "--scheduler-file", str(self.file))
-        command = [sys.executable, "-m", f"distributed.cli.{kind}", *common, *words]
+    def _process(
+        self, environment: dict[str, str], kind: str, *words: str
+    ) -> subprocess.Popen[bytes] | Forked:
+        command = [sys.executable, "-m", f"distributed.cli.{kind}", *self._words, *words]
         with self.log.open("ab") as log:
             return subprocess.Popen(command, stdout=log, stderr=log, env={**os.environ, **environment})
+
+    @property
+    def _words(self) -> tuple[str, ...]:
+        return ("--no-dashboard", "--host", "127.0.0.1", "--scheduler-file", str(self.file))
 
     def kill(self, victim: str, draw: random.Random) -> None:
         if victim == "scheduler":
@@ -111,6 +128,22 @@ class Cluster:
             process.kill()
             process.wait()
         self.scheduler, self.workers = None, []
+
+
+class ForkedCluster(Cluster):
+    """The same programs, of which no process loads the library anew."""
+
+    def _process(self, environment: dict[str, str], kind: str, *words: str) -> Forked:
+        assert not environment
+        process = Forked(target=self._serve, args=(kind, *words))
+        process.start()
+        return process
+
+    def _serve(self, kind: str, *words: str) -> None:
+        log = os.open(self.log, os.O_WRONLY | os.O_CREAT | os.O_APPEND)
+        os.dup2(log, 1)
+        os.dup2(log, 2)
+        {"dask_scheduler": dask_scheduler, "dask_worker": dask_worker}[kind].main([*self._words, *words])
 
 
 def child(number: int, folder: Path, engine: Engine) -> int:
@@ -191,7 +224,7 @@ def one_study(number: int, top: Path, cluster: Cluster, draw: random.Random) -> 
 def main(top: Path, kills: int, seed: int) -> dict[str, object]:
     """Disturb one study after the other until there were enough kills."""
     draw, met, number = random.Random(seed), Counter[str](), 0
-    cluster = Cluster(top)
+    cluster = ForkedCluster(top)
     try:
         while met.total() < kills:
             met.update(one_study(number, top, cluster, draw))

@@ -275,7 +275,7 @@ def test_change_points_of_known_steps_are_found_to_the_night_and_noise_has_none(
     for values in ([1.0, 1.0, 1.04, 1.04], [np.nan, 1.0]):
         assert change_points(np.array(values), 0.05) == ()
     courses = ([1.0] * 5 + [2.0] * 5, np.arange(10.0), [1.0, 2.0, 1.0, np.nan, 2.0, 1.0])
-    assert [flaps(np.array(course), 0.1) for course in courses] == [False, False, True]
+    assert [flaps(course, 0.1) for course in courses] == [False, False, True]
     assert missing_nights([f"2026-01-01T{h:02d}:0{m}:00Z" for h in range(3) for m in range(3)]) == ()
 
 
