@@ -25,6 +25,7 @@ from analyses.tuning.start import rule_gains
 from analyses.validation import CHECKS, QUICK
 from reports.live.keys import followed
 from reports.live.model import live_model
+from reports.sections.loop import section
 
 
 def poles(design: Design) -> np.ndarray:
@@ -172,6 +173,17 @@ def test_the_answer_to_the_command_of_a_law_that_takes_more_than_the_error() -> 
     told = float(note.partition("overshoot of ")[2].partition(" %")[0])
     assert told == pytest.approx(100.0 * (max(speed) / speed[-1] - 1.0), rel=1e-3)
     assert figures.step.overshoot_percent > 2.0 * told
+
+
+def test_the_page_says_where_the_loop_of_a_law_is_cut_and_whose_step_it_shows() -> None:
+    """At the amperes that it gives: an error of amperes, a step "of its command" are of no velocity loop."""
+    design = lead("velocity")
+    figures = all_loop_figures(assemble_loops(design))
+    pages = {name: section(name, design, one) for name, one in figures.items()}
+    assert pages["velocity"]["intro"].startswith("Cut at what its law gives (A), every")
+    assert pages["position"]["intro"].startswith("Cut at its error (rad), every")
+    assert "a unit step of the feedback alone" in f"{pages['velocity']}"
+    assert all("a unit step of its command" in f"{pages[name]}" for name in ("current", "position"))
 
 
 def test_the_rule_of_the_position_takes_the_crossover_of_the_law_inside() -> None:
