@@ -91,8 +91,12 @@ def export_linear(design: Design, asked: AskedLinear) -> Exported:
     tree = linear_models(design)
     data = written_models(tree, asked.to)
     write_bytes(target, data)
+    forms = [form for form in FORMS if form in tree]
     named = [*tree["sampled"]["loops"], *tree["sampled"]["break_points"], *tree["sampled"]["responses"]]
-    return Exported((str(target),), f"{target}: {', '.join(named)}, {' and '.join(FORMS)}, {len(data)} bytes")
+    behind = tree["sampled"]["responses"].get("command", {}).get("behind_mean_of_samples", 1)
+    mean = f" (behind the mean of {behind} samples of the command, which limits its jerk)" * (behind > 1)
+    said = f"{target}: {', '.join(named)}{mean}, {' and '.join(forms)}, {len(data)} bytes"
+    return Exported((str(target),), said)
 
 
 def _refuse_any(asked: AskedC | AskedController, names: Iterable[str]) -> None:

@@ -15,6 +15,7 @@ import numpy as np
 
 from actuator_lti.design import design_hash
 from actuator_lti.design.model import Design
+from actuator_lti.drive.profile import command_mean
 from actuator_lti.errors import InputError
 from actuator_lti.files.reading import Tree
 from actuator_lti.loops import Form, Loop, Loops, assemble_loops, exact_margins
@@ -66,7 +67,9 @@ def _form(loops: Loops) -> Tree:
     responses: Tree = {}
     if loops.plain_response is not None:
         _, unit = stage_words(design)
-        responses["command"] = _system(loops.plain_response, unit, f"{length}/s" if unit == "V" else unit)
+        command = _system(loops.plain_response, unit, f"{length}/s" if unit == "V" else unit)
+        mean = command_mean(design)  # as states a chain of its samples
+        responses["command"] = command | {"behind_mean_of_samples": mean.samples if mean else 1}
     if loops.moment_system is not None:
         responses["load"] = _system(loops.moment_system(), force, length)
     return {

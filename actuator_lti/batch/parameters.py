@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -52,7 +52,8 @@ class Population:
     @cached_property
     def stacked(self) -> Design:
         """The design with arrays of shape (count,) in place of the numbers that vary."""
-        return stacked(self.design, {p: np.asarray(v, dtype=float) for p, v in self.values.items()})
+        made = stacked(self.design, {p: np.asarray(v, dtype=float) for p, v in self.values.items()})
+        return replace(made, nominal=self.design.nominal or self.design)
 
     def part(self, chosen: Any) -> Population:
         """Some of the designs, by a slice or by their numbers."""

@@ -10,7 +10,7 @@ from actuator_lti.design.checks import contradictions
 from actuator_lti.design.fields import Field, Structure, field_of, fields_in, part_at, parts_of, with_part
 from actuator_lti.design.mistakes import Findings, nearest
 from actuator_lti.design.model import Design
-from actuator_lti.design.tolerances import rescaled
+from actuator_lti.design.tolerances import rescaled, together
 from actuator_lti.design.units import ampere_unit, si_text
 from actuator_lti.errors import InputError
 from actuator_lti.files.reading import shown
@@ -79,6 +79,15 @@ def with_values(design: Design, values: Mapping[str, float], *, check: bool = Tr
     if check:
         Findings(design.origin or design.name).refuse(contradictions(changed))
     return changed
+
+
+def varied(design: Design, values: Mapping[str, Any]) -> Design:
+    """A drive that came out with other SI values, its controller still set for the nominal one.
+
+    With kM goes kE (`together`); values are refused one by one, not for what they are to each other.
+    """
+    changed = with_values(design, together(design, values), check=False)
+    return replace(changed, nominal=design.nominal or design)
 
 
 def _changed(design: Design, path: str, value: float) -> Parameter:

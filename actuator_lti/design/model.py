@@ -96,6 +96,7 @@ class Design:
     description: Annotated[str, text("what the drive is and where its figures come from")] = ""
     origin: str = ""
     written: frozenset[str] = field(default=frozenset(), compare=False)  # keys that stand in its file
+    nominal: "Design | None" = None  # what the controller of a drive that came out otherwise is set for
 
     def with_values(self, values: Mapping[str, Any]) -> "Design":
         """A copy with some keys changed, as a design file would write them.
@@ -231,6 +232,16 @@ class Design:
         behind = self.gears[self.gears_before_coupling :]
         return _train_inertia(behind) + self.load.inertia_kgm2 / self.ratio_behind_coupling**2
 
+    @property
+    def dc_of_sheet(self) -> dict[str, float]:
+        """R, L, kM and kE of the equivalent DC motor over those of the data sheet, by attribute."""
+        return _EQUIVALENT[self.motor.constants]
+
+    @cached_property
+    def controller_model(self) -> "Design":
+        """The drive whose J, kM, R and kE feed-forward computes with: the nominal one of its data sheet."""
+        return replace(self if self.nominal is None else self.nominal, temperature=None)
+
     @cached_property
     def effective_motor(self) -> Motor:
         """The motor as the model has it: one constant k, phase-phase R and L, at its temperature.
@@ -242,18 +253,13 @@ class Design:
         motor = self.motor
         if motor.resistance_ohm is None:
             return motor
-        torque, voltage, impedance = _EQUIVALENT[motor.constants]
         winding = magnet = 1.0
         if self.temperature is not None:
             heat = self.temperature
             magnet += heat.magnet_per_K * (heat.magnet_degC - heat.reference_degC)
             winding += heat.resistance_per_K * (heat.winding_degC - heat.reference_degC)
-        factors = {
-            "resistance_ohm": impedance * winding,
-            "inductance_H": impedance,
-            "torque_constant_Nm_A": torque * magnet,
-            "back_emf_constant_Vs_rad": voltage * magnet,
-        }
+        warm = {"resistance_ohm": winding, "torque_constant_Nm_A": magnet, "back_emf_constant_Vs_rad": magnet}
+        factors = {name: factor * warm.get(name, 1.0) for name, factor in self.dc_of_sheet.items()}
         stated = {name: getattr(motor, name) for name in factors}
         same = {name: value * factors[name] for name, value in stated.items() if value is not None}
         if motor.torque_constant_Nm_A is not None:
@@ -261,11 +267,20 @@ class Design:
         return replace(motor, **same, constants="dc")
 
 
-# factors on kM, on kE, and on R and L, from the data sheet to the equivalent DC motor
-_EQUIVALENT: dict[MotorConstants, tuple[float, float, float]] = {
-    "dc": (1.0, 1.0, 1.0),
-    "rms-line": (1.0 / DC_PER_A["rms-line"], sqrt(2.0), 1.0),
-    "peak-phase": (1.0 / DC_PER_A["peak-phase"], sqrt(3.0), 2.0),
+def _equivalent(torque: float, voltage: float, impedance: float) -> dict[str, float]:
+    return {
+        "resistance_ohm": impedance,
+        "inductance_H": impedance,
+        "torque_constant_Nm_A": torque,
+        "back_emf_constant_Vs_rad": voltage,
+    }
+
+
+# from the data sheet to the equivalent DC motor
+_EQUIVALENT: dict[MotorConstants, dict[str, float]] = {
+    "dc": _equivalent(1.0, 1.0, 1.0),
+    "rms-line": _equivalent(1.0 / DC_PER_A["rms-line"], sqrt(2.0), 1.0),
+    "peak-phase": _equivalent(1.0 / DC_PER_A["peak-phase"], sqrt(3.0), 2.0),
 }
 
 

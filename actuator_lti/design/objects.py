@@ -7,6 +7,7 @@ from typing import Any
 from actuator_lti.design.access import parameter_value, with_values
 from actuator_lti.design.asked import ControllerObject, ControllerObjects, FrozenMap, ObjectPlace
 from actuator_lti.design.checks import contradictions
+from actuator_lti.design.fields import FIELDS, parts_of
 from actuator_lti.design.mistakes import Findings
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError, in_file
@@ -16,6 +17,7 @@ U16, U32 = 2**16 - 1, 2**32 - 1
 REV, RPM, PER_RPM = 2.0 * pi, 2.0 * pi / 60.0, 60.0 / (2.0 * pi)
 MAX_OBJECTS = 5000
 _TOLERATED = 1e-9
+_RATES = (".period", ".computing_delay", ".every")
 _TORQUE_LIMITS = ((0x60E0, 0), (0x60E1, 0))
 _Values = dict[tuple[int, int], int]
 
@@ -82,15 +84,20 @@ def step_of(known: KnownObject, velocity_gain_factor: float) -> float:
 
 
 def model_value(design: Design, known: KnownObject) -> float | None:
-    """In SI; None if the design says nothing."""
+    """In SI, of an AC motor that of the equivalent DC motor; None if the design says nothing."""
     if known.place == (0x2329, 10):  # all inertia but the rotor's
         return design.inertia_kgm2 - design.motor.rotor_inertia_kgm2
     paths = known.paths if known.alias_of is None else OBJECTS[known.alias_of].paths
     try:
-        value = parameter_value(design, paths[0]) if paths else inf
+        value = parameter_value(design, paths[0]) * _dc_of_sheet(design, paths[0]) if paths else inf
     except InputError:
         return None
     return value if isfinite(value) else None
+
+
+def _dc_of_sheet(design: Design, path: str) -> float:
+    """A controller counts the amperes of the equivalent DC motor, for which its kM, R and L hold."""
+    return design.dc_of_sheet.get(FIELDS[path].attribute, 1.0)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -149,7 +156,7 @@ def import_objects(objects: ControllerObjects, base: Design, where: str = "setti
         step = step_of(known, objects.velocity_gain_factor)
         current = model_value(base, known)
         if current is None or round(current / step) != item.value:
-            changes.update(dict.fromkeys(known.paths, item.value * step))
+            changes.update({path: item.value * step / _dc_of_sheet(base, path) for path in known.paths})
     design = with_values(base, changes, check=False) if changes else base
     source, old = f"controller settings {where}", design.parameters
     named = {path: replace(old[path], source=source, grade="B") for path in changes}
@@ -245,8 +252,21 @@ def export_objects(design: Design, *, complete: bool | None = None) -> Exported:
     notes = [f"velocity gain 0x2344.01 written with calibration factor {before.velocity_gain_factor:.4g}"]
     left = [] if complete else [known.label for known in missing if known.paths]
     notes += [f"not in the imported settings, so not written: {', '.join(left)}"] if left else []
+    unheld = _unheld(design)
+    notes += [f"no object holds, so not written: {', '.join(unheld)}"] if unheld else []
     settings = replace(before, values=tuple(written))
     return Exported(objects=settings, rounded=tuple(rounded), notes=tuple(notes))
+
+
+def _unheld(design: Design) -> list[str]:
+    """What the design's controller has besides: filters and keys with a number, rates and delay aside."""
+    held = {path for known in _LIST for path in known.paths}
+    filters = [path for _, path, _ in parts_of(design) if ".filter." in path]
+    stated = [path for path, one in design.parameters.items() if one.value and ".filter." not in path]
+    return filters + [
+        path for path in stated
+        if path.startswith(("control.", "command.")) and path not in held and not path.endswith(_RATES)
+    ]  # fmt: skip
 
 
 def _encode(design: Design, known: KnownObject, rounded: list[Rounding]) -> int | None:

@@ -5,7 +5,7 @@ import json
 import re
 from collections.abc import Mapping
 from contextlib import suppress
-from dataclasses import asdict, is_dataclass
+from dataclasses import asdict, is_dataclass, replace
 from dataclasses import fields as dataclass_fields
 from math import inf, isclose, isfinite
 from numbers import Integral, Real
@@ -14,13 +14,14 @@ from typing import Any, cast
 import tomli_w
 
 from actuator_lti.asked.quantities import unit_words
-from actuator_lti.design.access import located, unit_in_file
+from actuator_lti.design.access import located, parameter_value, paths_of, stacked, unit_in_file
 from actuator_lti.design.asked import ControllerObjects, Parameter, Tolerance, default_deflection
 from actuator_lti.design.data_sheet import as_stated
 from actuator_lti.design.fields import RECORDS, SECTIONS, TABLES, Section, field_of, fields_in, parts_of
 from actuator_lti.design.loader import as_design, design_from_tree, design_text, read_design_text
 from actuator_lti.design.mistakes import UNREAD, Findings
 from actuator_lti.design.model import Design
+from actuator_lti.design.plant import torque_per_command
 from actuator_lti.design.reader import Reader
 from actuator_lti.design.settings_file import object_entry
 from actuator_lti.design.spellings import split_quantity
@@ -64,6 +65,7 @@ def _changed(raw: Tree, old: Tree, new: Tree) -> Tree:
 
 def design_tree(design: Design) -> Tree:
     """The tree of plain values behind :func:`write_design`."""
+    design = _by_its_own_numbers(design)
     head = {"name": design.name, "title": design.title, "axis": design.axis}
     head |= {key: getattr(design, key) for key in ("revision", "description") if getattr(design, key)}
     tree: Tree = {"design": head}
@@ -86,6 +88,26 @@ def design_tree(design: Design) -> Tree:
             **({"family": design.objects.family} if design.objects.family else {}),
         }
     return {key: value for key, value in tree.items() if value != []}  # an empty [supply] is one
+
+
+def _by_its_own_numbers(design: Design) -> Design:
+    """The same drive as a file can say it: feed-forward as shares of its own numbers, not the nominal's."""
+    if design.nominal is None:
+        return design
+    own = replace(design, nominal=None)
+    set_for, now = (_whole_shares(one.controller_model) for one in (design, own))
+    there = now.keys() & paths_of(own)
+    return stacked(own, {path: parameter_value(own, path) * set_for[path] / now[path] for path in there})
+
+
+def _whole_shares(model: Design) -> dict[str, Any]:
+    """What a share of 1 of each feed-forward is to a controller that is set for this drive."""
+    motor, inertia = model.effective_motor, model.inertia_kgm2
+    return {
+        "control.position.acceleration_feedforward": inertia / torque_per_command(model),
+        "control.current.resistance_feedforward": motor.resistance_ohm,
+        "control.current.back_emf_feedforward": motor.back_emf_constant_Vs_rad,
+    }
 
 
 def _table(design: Design, part: Any, name: str, section: Section) -> Tree:
@@ -275,7 +297,7 @@ def _label(item: Tree, number: int) -> str:
 
 def design_hash(design: Design) -> str:
     """SHA-256 (hex) of all values in SI to 12 digits, tolerances, requirements; not of titles or sources."""
-    design = as_design(design)
+    design = _by_its_own_numbers(as_design(design))
     parts = [section for section in SECTIONS if not section.parent]
     top = {part.place for part in parts if not part.asked or getattr(design, part.place) is not None}
     content = {key: _canonical(getattr(design, key)) for key in ("axis", *sorted(top))}

@@ -95,9 +95,17 @@ def drive_gain(design: Design) -> Any:
     stiff = None if motor.source_gain_Nm_V is not None else _held_ohm(design)
     if current is None or stiff is None:
         return torque_per_command(design)
-    R, kM, _ = winding(motor)
     fed = current.gain_V_A if current.law is None else current.law.steady("command")
-    return kM * (fed + current.resistance_feedforward * R) / stiff
+    return winding(motor)[1] * (fed + fed_forward(design)[0]) / stiff
+
+
+def fed_forward(design: Design) -> tuple[Any, Any]:
+    """What the current stage adds to the voltage, per current command in ohm and per speed in V s/rad."""
+    current = design.controller.current
+    if current is None:
+        return 0.0, 0.0
+    R, _, kE = winding(design.controller_model.effective_motor)
+    return current.resistance_feedforward * R, current.back_emf_feedforward * kE
 
 
 def _held_ohm(design: Design) -> Any:
@@ -113,13 +121,12 @@ def _held_ohm(design: Design) -> Any:
 
 def back_emf_Nms_rad(design: Design) -> Any:
     """Motor torque lost per speed to back-EMF that no current integral and no feed-forward makes up for."""
-    motor, current = design.effective_motor, design.controller.current
+    motor = design.effective_motor
     stiff = None if motor.source_gain_Nm_V is not None else _held_ohm(design)
     if stiff is None:
         return 0.0
     _, kM, kE = winding(motor)
-    left = 1.0 if current is None else 1.0 - current.back_emf_feedforward
-    return kM * left * kE / stiff
+    return kM * (kE - fed_forward(design)[1]) / stiff
 
 
 def droop(design: Design) -> tuple[Any, Any] | None:

@@ -156,8 +156,9 @@ class Loops:
     def reference_to_output(self) -> Any | None:
         """Command at the output shaft to output angle, feed-forward included, as a python-control system.
 
-        Of a speed drive the command to the motor's speed, of a torque drive to its current, of a voltage
-        drive to the motor's speed. None with the rotor locked.
+        The command is that behind the mean which limits its jerk (`actuator_lti.drive.profile`), before its
+        filter. Of a speed drive the command to the motor's speed, of a torque drive to its current, of a
+        voltage drive to the motor's speed. None with the rotor locked.
         """
         return as_control(self.plain_response)
 

@@ -197,7 +197,8 @@ class Walk(ABC):
             rate = self.derivative("ref", command, T)
             value = value + law.feedforward * rate
         if present(law.acceleration_feedforward):
-            needed = self.design.inertia_kgm2 / torque_per_command(self.design)  # J/kM
+            model = self.design.controller_model
+            needed = model.inertia_kgm2 / torque_per_command(model)  # J/kM
             made = law.acceleration_feedforward * needed * self.derivative("rate", rate, T)
             if "velocity" not in self.program.stages:
                 value = value + made
@@ -246,7 +247,7 @@ class Walk(ABC):
 
     def current(self, reference: Row) -> Row:
         """PI on the current, and the feed-forward of back-EMF and resistance voltage."""
-        law, motor = self.control.current, self.design.effective_motor
+        law, motor = self.control.current, self.design.controller_model.effective_motor
         assert law is not None
         assert motor.back_emf_constant_Vs_rad is not None
         assert motor.resistance_ohm is not None

@@ -8,7 +8,7 @@ import numpy as np
 
 from actuator_lti.asked.quantities import ANALYSIS_QUANTITIES, CORNERED, QUANTITIES
 from actuator_lti.asked.verdict import Tally, Verdict
-from actuator_lti.design.access import with_values
+from actuator_lti.design.access import varied
 from actuator_lti.design.checks import contradictions
 from actuator_lti.design.loader import AnyDesign, as_design
 from actuator_lti.design.model import Design, Requirement, Temperature
@@ -142,7 +142,7 @@ def _made(design: Design, asked: Asked) -> Iterator[tuple[str, str, Design]]:
             sides = [([path for path in away if way * away[path] > 0.0], way) for way in (1, -1)]
             ends = [f"{', '.join(paths)} {'high' if way > 0 else 'low'}" for paths, way in sides if paths]
             words = f"each tolerance at the end that {worse} it: {'; '.join(ends)}"
-            yield name, words, with_values(design, values, check=False)
+            yield name, words, varied(design, values)
 
 
 def at_temperature(design: Design, degC: float) -> Design:

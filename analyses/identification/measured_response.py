@@ -77,10 +77,10 @@ def identify_response(
     """
     measured = read_response(source, averages)
     start = with_values(design, dict(fixed or {}))
-    model = loop_model(start, loop, of, measured)
+    model, grows = loop_model(start, loop, of, measured)
     known = bool(np.all(np.isfinite(measured.deviation) & (measured.deviation > 0.0)))
     size = np.abs(measured.response) * (measured.deviation / np.sqrt(2.0) if known else 1.0)
-    seen = Seen(measured=measured.response, size=size, known=known, model=model)
+    seen = Seen(measured=measured.response, size=size, known=known, model=model, grows=grows)
     held = {key: Fixed(value=value, reason="fixed as asked") for key, value in (fixed or {}).items()}
     if start.load.inertia_kgm2 == 0.0:
         held.setdefault("load.inertia", Fixed(value=0.0, reason="0 in the design: kept"))
@@ -102,7 +102,7 @@ def identify_response(
     made = _written(start, fit, given, f"frequency response {measured.name}{constant}")
     given |= {key: _told(start, key, given[key]) for key in hanging}
     fit = replace(fit, covariance=fit.joint, fixed={**held, **fit.fixed, **given})
-    modelled = loop_model(read_design_text(write_design(made)), loop, of, measured)({})[0]
+    modelled = loop_model(read_design_text(write_design(made)), loop, of, measured)[0]({})[0]
     error = float(np.sqrt(np.mean(np.abs(modelled / measured.response - 1.0) ** 2)))
     items = [simulated_item(measured.name, error, limit, "its response, rms over the frequencies")]
     if fit.misfit is not None:
@@ -112,6 +112,9 @@ def identify_response(
         items.insert(0, Item.of("misfit", label, "" if level > NO_CHANCE else why))
     ended = "it ended at the least or largest value of its key: the response wants another"
     items += [Item.of(f"bound-{key}", f"{key} is within what its key allows", ended) for key in fit.at_bound]
+    if grows({key: np.array([value]) for key, value in zip(fit.names, fit.values, strict=True)})[0]:
+        told = "what was closed while it was measured is not stable with these values: another drive"
+        items.append(Item.of("stable", "The drive that was found can be measured", told))
     if fit.also:
         told = ", ".join(f"{key} = {value:.4g}" for key, value in fit.also.items())
         wrong = f"{told} (SI) explain it as well: hold one of them (--fix), or measure more frequencies"

@@ -49,6 +49,8 @@ class _Side:
         goal = self.best.cost + self.level**2 if at == self.most else 0.0
         there = self.search.least(begin, enough=ROUGH, hold=self.k, goal=goal)
         if there.cost < self.best.cost - CLOSE * self.level**2:
+            if self.search.rank(there) > self.search.rank(self.best):  # it grows: the interval ends before
+                return there.x, np.inf
             raise _Lower(there.x)
         return there.x, float(np.sqrt(max(there.cost - self.best.cost, 0.0))) / self.level
 
@@ -133,15 +135,15 @@ def determined(start: Design, names: tuple[str, ...], seen: Seen, progress: Prog
         if progress is not None:
             progress(len(left), len(names))
         n, kept = len(mine), tuple(key for key in left if parameter_value(start, key))
-        search, rough = (Search.of(start, mine, residual) for residual in (seen.off, seen.ratio))
-        best, *others = _fits(search, rough, [x[:n] for x in better])
+        search, rough = (Search.of(start, mine, one, seen.grows) for one in (seen.off, seen.ratio))
+        best, *others = _fits(search, rough, [x[:n] for x in better], start.controller.period_s)
         freedom = len(best.rest) - n
         variance = best.cost / freedom
         unit = float(np.sqrt(max(variance, 1.0) if seen.known else variance))
         level = COVERAGE if seen.known else float(stdtrit(freedom, 0.975))
-        beside = Search.of(start, mine, seen.off, kept, unit)
+        beside = Search.of(start, mine, seen.off, seen.grows, kept, unit)
         begins = [np.append(best.x, np.zeros(len(kept))), *better]
-        joint = min((beside.least(beside.at(x)) for x in begins), key=lambda one: one.cost)
+        joint = min((beside.least(beside.at(x)) for x in begins), key=beside.rank)
         try:
             ends, untold = _asked(start, beside, joint, level)
         except _Lower as lower:
@@ -156,15 +158,26 @@ def determined(start: Design, names: tuple[str, ...], seen: Seen, progress: Prog
     raise InputError(f"the response determines nothing of {', '.join(left)}", where=start.name)
 
 
-def _fits(search: Search, rough: Search, more: Sequence[Floats]) -> list[Point]:
-    """Fits from several stiffnesses, of the response's logarithm first, and from more; the best one first."""
+def _fits(search: Search, rough: Search, more: Sequence[Floats], tick_s: float) -> list[Point]:
+    """Fits from several stiffnesses, of the response's logarithm first, and from more; the best one first.
+
+    Over the computing delay the response has a kink at each whole tick, which a search does not pass: from
+    the middle of the ticks beside the best one it begins again.
+    """
     spring = np.array([name == "coupling.stiffness" for name in search.names])
     begin = np.where(search.logs, 0.0, 1.0)
     starts = [begin + np.log(factor) * spring for factor in (STARTS if spring.any() else STARTS[:1])]
     ended = [rough.least(rough.at(x), enough=ROUGH) for x in starts]
     least = min(one.cost for one in ended)
     good = [one.x for one in ended if one.cost <= 2.0 * least]
-    return sorted((search.least(search.at(x)) for x in (*good, *more)), key=lambda one: one.cost)
+    fits = sorted((search.least(search.at(x)) for x in (*good, *more)), key=search.rank)
+    late, tried = np.array([name == "control.computing_delay" for name in search.names]), set[int]()
+    while late.any() and (tick := int(search.values(fits[0].x)[late][0] / tick_s)) not in tried:
+        tried.add(tick)
+        beside = [(one + 0.5) * tick_s / search.turn[late, late] for one in (tick - 1, tick + 1)]
+        begins = [np.where(late, at, fits[0].x) for at in beside if at > 0.0]
+        fits = sorted([*fits, *(search.least(search.at(x)) for x in begins)], key=search.rank)
+    return fits
 
 
 def _asked(start: Design, search: Search, joint: Point, level: float) -> tuple[Floats, dict[str, str]]:
@@ -211,7 +224,7 @@ def _told(
     gained = np.linalg.qr(best.slopes)[0].T @ best.rest / beside.unit  # by leaving the box
     ended = np.any(best.x == search.box, axis=0) & (search.logs | (gained @ gained > level**2))
     most = best.cost + (level * beside.unit) ** 2
-    also = [search.values(one.x) for one in others if one.cost <= most]
+    also = [search.values(one.x) for one in others if search.rank(one) <= (search.rank(best)[0], most)]
     also = [one for one in also if np.any((one < ends[:, 0]) | (one > ends[:, 1]))]
     return ResponseFit(
         names=search.names,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import reduce
 from typing import Any
 
 import numpy as np
@@ -18,20 +19,25 @@ from actuator_lti.loops.periodic import phase_blocks, point_blocks
 from actuator_lti.loops.sampled import stage_blocks, whole_path
 from actuator_lti.loops.tick import Block, TickProgram, mean_response
 from actuator_lti.systems.sampling import split_delay
-from actuator_lti.types import Complexes, Floats
+from actuator_lti.types import Complexes, Floats, Mask
 from analyses.identification.asked import Of
 
 Values = Mapping[str, Floats]  # values in SI by key, each of shape (K,): K designs
+ROUNDED = float(np.finfo(float).eps) ** 0.25  # how far rounding scatters four eigenvalues at 1
 
 
 @dataclass(frozen=True, kw_only=True)
 class Seen:
-    """A measured response, shape (F,), the deviation of each of its parts (1: not known), and the model."""
+    """A measured response, shape (F,), the deviation of each of its parts (1: not known), and the model.
+
+    ``grows``: of which designs more modes grow than of the first: nobody measures them.
+    """
 
     measured: Complexes
     size: Floats
     known: bool
     model: Callable[[Values], Complexes]
+    grows: Callable[[Values], Mask]
 
     def parts(self, values: Complexes) -> Floats:
         """Real and imaginary parts over their deviations, shape (..., 2 F)."""
@@ -48,8 +54,8 @@ class Seen:
 
 def loop_model(
     design: Design, loop: str | None, of: Of, measured: RecordedResponse
-) -> Callable[[Values], Complexes]:
-    """The responses, shape (K, F), of designs that differ in some values from one."""
+) -> tuple[Callable[[Values], Complexes], Callable[[Values], Mask]]:
+    """The responses, shape (K, F), of designs that differ in some values from one; which of them grow."""
     wired = wire(design, Operating())
     name = loop or wired.outermost
     there = (*wired.stages, *wired.points)
@@ -65,7 +71,14 @@ def loop_model(
             return stage_blocks(wired, name), wired.period_s(name)
         return point_blocks(wired, name), wired.period_s(wired.producer(name))
 
-    period_s = blocks(wired)[1]
+    def growing(wired: Drive) -> Any:
+        """Modes that grow: of T and S with the loop closed, of L with those inside it."""
+        made, _ = blocks(wired)
+        closed = [block.feedback() for block in made] if of in ("T", "S") else made
+        over = reduce(lambda before, block: block.A @ before, closed[1:], closed[0].A)
+        return np.count_nonzero(np.abs(np.linalg.eigvals(over)) > 1.0 + ROUNDED, axis=-1)
+
+    period_s, most = blocks(wired)[1], growing(wired)
     measured.refuse_other_period(name, period_s)
     top = 0.5 / period_s
     if not (last := measured.frequency_hz[-1]) < top:
@@ -93,4 +106,7 @@ def loop_model(
             result[kinds == kind] = alike(dict(zip(names, table[:, kinds == kind], strict=True)))
         return result
 
-    return response
+    def grows(values: Values) -> Mask:
+        return np.asarray(growing(wire(stacked(design, values), Operating())) > most)
+
+    return response, grows

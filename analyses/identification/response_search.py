@@ -58,6 +58,7 @@ class Search:
     """
 
     residual: Callable[[Values], Floats]
+    grows: Callable[[Values], Mask]  # see `Seen`
     names: tuple[str, ...]
     count: int  # of those that are looked for, the first
     logs: Mask
@@ -73,6 +74,7 @@ class Search:
         start: Design,
         names: tuple[str, ...],
         residual: Callable[[Values], Floats],
+        grows: Callable[[Values], Mask],
         kept: tuple[str, ...] = (),
         unit: float = 1.0,
     ) -> Search:
@@ -88,6 +90,7 @@ class Search:
         box[:, n:] = [[-np.inf], [np.inf]]
         return cls(
             residual=residual,
+            grows=grows,
             names=(*names, *kept),
             count=n,
             logs=logs,
@@ -110,8 +113,14 @@ class Search:
 
     def off(self, x: Floats) -> Floats:
         """What is left at coordinates of shape (K, p), beside it the deviations of what is kept."""
-        values = dict(zip(self.names, self.values(x).T, strict=True))
-        return np.hstack([self.residual(values) / self.unit, x[:, self.count :]])
+        return np.hstack([self.residual(self._named(x)) / self.unit, x[:, self.count :]])
+
+    def _named(self, x: Floats) -> Values:
+        return dict(zip(self.names, self.values(x).T, strict=True))
+
+    def rank(self, one: Point) -> tuple[bool, float]:
+        """By which fits are sorted: what grows last, since nobody measures that, then by the cost."""
+        return bool(self.grows(self._named(one.x[None]))[0]), one.cost
 
     def at(self, x: Floats) -> Point:
         """What is left at coordinates, held in the box, and its slopes by central differences."""

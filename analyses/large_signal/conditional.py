@@ -3,19 +3,20 @@
 A limit takes gain away, under which a loop with a lower gain margin goes unstable. The describing function of
 saturation says from which amplitude in front of the limit on an oscillation grows; whether the drive gets
 there is found in time, by steps of growing size. It knows nothing of anti-windup (model.md section 2), with
-which the drive is safer. A voltage limit behind a current loop is taken as the current limit U/R: the
-velocity controller does not know of it and goes on integrating.
+which the drive is safer. A voltage limit behind a current loop is taken as the command of the current U/R:
+the velocity controller does not know of it and goes on integrating.
 """
 
 from dataclasses import dataclass
 from itertools import pairwise
-from math import asin, ceil, isfinite, pi, sqrt
+from math import asin, ceil, inf, isfinite, pi, sqrt
 from typing import Any, Literal
 
 import numpy as np
 from scipy.optimize import brentq
 
 from actuator_lti.design.model import Design
+from actuator_lti.drive.steady import back_emf_Nms_rad, drive_gain, voltage_limit_torque_Nm
 from actuator_lti.drive.wiring import wire
 from actuator_lti.loops import ExactMargins, Loops, exact_margins, periodic_loop
 from actuator_lti.loops.periodic import PeriodicLoop
@@ -117,7 +118,8 @@ def _limits(design: Design) -> list[tuple[str, float, str]]:
     limits, points = design.limits, wire(design).points
     result = [("u", limits.voltage_V, "voltage limit")]
     if "i_ref" in points:
-        short = limits.voltage_V / (design.effective_motor.resistance_ohm or 1.0)
+        gain, most = abs(drive_gain(design)), voltage_limit_torque_Nm(design, 0.0)
+        short = most / gain if gain else inf
         name = "current limit" if limits.peak_current_A <= short else "voltage limit as a current, U/R"
         result = [("i_ref", min(limits.peak_current_A, short), name)]
     if "w_ref" in points:
@@ -159,9 +161,9 @@ def _to_output(design: Design, point: str, omega: float) -> float:
     if point == "w_ref":
         return 1.0 / (omega * N)
     drag, kM = design.friction.viscous(), motor.torque_constant_Nm_A or 0.0
+    if point == "i_ref":  # an ideal current loop, but for what a P controller leaves of its command
+        return float(abs(drive_gain(design)) / (abs(J * s + drag + back_emf_Nms_rad(design)) * omega * N))
     inertia = abs(J * s**2 + drag * s)
-    if point == "i_ref":
-        return kM / (inertia * N)
     if motor.source_gain_Nm_V is not None:
         return motor.source_gain_Nm_V / (inertia * N)
     assert motor.resistance_ohm is not None

@@ -32,6 +32,12 @@ class Judged:
     value: np.ndarray  # the figure that is limited, the worst of the loops, NaN where there is none
     distance: np.ndarray  # to the limit, positive where met; -inf: unstable, or the figure is missing
     passed: np.ndarray
+    unresolved: np.ndarray  # no loop fails, but rounding decides whether one is stable
+
+    @property
+    def resolved(self) -> np.ndarray:
+        """The distance, inf where it is not resolved: such a drive is not the worst that is known."""
+        return np.where(self.unresolved, np.inf, self.distance)
 
 
 def loops_of(design: Design) -> tuple[str, ...]:
@@ -57,11 +63,14 @@ def loop_column(design: Design, loop: str, quantity: str) -> str:
 def loop_columns(
     linear: LinearFigures, design: Design, quantities: Iterable[str] = LOOP_QUANTITIES
 ) -> dict[str, np.ndarray]:
-    """Columns of the loops of many designs: whether each is stable (1 or 0), and its figures, NaN if not."""
+    """Columns of the loops of many designs: whether each is stable, and its figures, NaN if not.
+
+    Stable is 1, not stable 0, and NaN where rounding decides it.
+    """
     columns: dict[str, np.ndarray] = {}
     for loop in linear.loops:
         stable = linear.stable(loop)
-        columns[f"{loop}.stable"] = stable.astype(float)
+        columns[f"{loop}.stable"] = np.where(linear.withheld(loop), np.nan, stable)
         for name in quantities:
             columns[loop_column(design, loop, name)] = np.where(stable, linear.quantity(name, loop), np.nan)
     return columns
@@ -115,10 +124,13 @@ def judge(requirement: Requirement, design: Design, columns: Columns) -> Judged:
     if QUANTITIES[requirement.quantity].absolute:
         values = np.abs(values)  # a margin counts in either direction
     distances = requirement.distance(values)
+    always = np.ones(values.shape[1])  # there: a figure of the drive
+    stable = np.stack([columns.get(f"{name.partition('.')[0]}.stable", always) for name in names])
     distances[np.isnan(values)] = -np.inf
     worst, places = np.argmin(distances, axis=0), np.arange(values.shape[1])
-    distance = distances[worst, places]
-    return Judged(values[worst, places], distance, distance >= 0.0)
+    distance, unresolved = distances[worst, places], np.isnan(stable)
+    fails = np.any((distances < 0.0) & ~unresolved, axis=0)
+    return Judged(values[worst, places], distance, distance >= 0.0, unresolved.any(axis=0) & ~fails)
 
 
 WORST_KEPT = 8
@@ -127,28 +139,31 @@ BLOCK = 4096  # samples that are in memory at once
 
 @dataclass(frozen=True)
 class Tally:
-    """Passes of one requirement, and its worst samples: distance, number, value."""
+    """Passes of one requirement, samples not resolved, and its worst: distance, number, value."""
 
     passed: int = 0
+    unresolved: int = 0
     worst: tuple[tuple[float, int, float], ...] = ()
 
     @classmethod
-    def of(cls, distance: np.ndarray, number: np.ndarray, value: np.ndarray, passed: np.ndarray) -> Tally:
-        order = np.argsort(distance, kind="stable")[:WORST_KEPT]
-        worst = tuple((float(distance[k]), int(number[k]), float(value[k])) for k in order)
-        return cls(int(passed.sum()), worst)
+    def of(cls, found: Judged, number: np.ndarray) -> Tally:
+        order = np.argsort(found.resolved, kind="stable")[:WORST_KEPT]
+        worst = tuple((float(found.resolved[k]), int(number[k]), float(found.value[k])) for k in order)
+        return cls(int(found.passed.sum()), int(found.unresolved.sum()), worst)
 
     def merged(self, other: Tally) -> Tally:
         worst = sorted([*self.worst, *other.worst], key=lambda one: one[:2])[:WORST_KEPT]
-        return Tally(self.passed + other.passed, tuple(worst))
+        return Tally(self.passed + other.passed, self.unresolved + other.unresolved, tuple(worst))
 
 
 @dataclass(frozen=True)
 class Reduction:
-    """Of some samples; ``together`` meet every requirement, tallies are in the order of `judged`."""
+    """Of some samples; ``together`` is of all requirements, tallies are in the order of `judged`."""
 
     count: int = 0
-    together: int = 0
+    together: Tally = Tally()
+    unstable: int = 0  # of the outermost loop, the drive as a whole
+    unresolved: int = 0
     columns: Mapping[str, Sketch] = field(default_factory=dict)
     tallies: tuple[Tally, ...] = ()
 
@@ -157,7 +172,9 @@ class Reduction:
             return self if self.count else other
         return Reduction(
             self.count + other.count,
-            self.together + other.together,
+            self.together.merged(other.together),
+            self.unstable + other.unstable,
+            self.unresolved + other.unresolved,
             {name: sketch.merged(other.columns[name]) for name, sketch in self.columns.items()},
             tuple(a.merged(b) for a, b in zip(self.tallies, other.tallies, strict=True)),
         )
@@ -175,8 +192,12 @@ def unpacked(data: bytes) -> tuple[Reduction, list[Chunk]]:
         for name, sketch in about["columns"].items():
             keys, counts = (np.array(sketch[of], dtype=np.int64) for of in ("keys", "counts"))
             columns[name] = Sketch(**{**sketch, "keys": keys, "counts": counts})
-        tallies = tuple(Tally(one["passed"], tuple(map(tuple, one["worst"]))) for one in about["tallies"])
-        whole = Reduction(about["count"], about["together"], columns, tallies)
+        together, *tallies = (
+            Tally(**{**one, "worst": tuple(map(tuple, one["worst"]))})
+            for one in (about["together"], *about["tallies"])
+        )
+        read = {"together": together, "columns": columns, "tallies": tuple(tallies)}
+        whole = Reduction(**{**about, **read})
         return whole, [(int(first), int(count)) for first, count in done]
     except (ValueError, KeyError, TypeError, AttributeError, OverflowError, zlib.error):
         return Reduction(), []
@@ -189,14 +210,19 @@ def judged(design: Design) -> list[Requirement]:
 
 def reduced(task: SampleTask, block: Mapping[str, np.ndarray]) -> Reduction:
     """What the samples of a block come to."""
-    together = np.ones(len(block["sample"]), dtype=bool)
-    tallies = []
-    for requirement in judged(task.design):
-        found = judge(requirement, task.design, block)
-        tallies.append(Tally.of(found.distance, block["sample"], found.value, found.passed))
-        together &= found.passed
-    columns = {name: Sketch.of(block[name]) for name in task.units}
-    return Reduction(len(together), int(together.sum()), columns, tuple(tallies))
+    count = len(block["sample"])
+    every = [judge(requirement, task.design, block) for requirement in judged(task.design)]
+    passed, met = np.ones((2, count), dtype=bool)
+    for found in every:
+        passed &= found.passed
+        met &= found.passed | found.unresolved
+    together = Tally(int(passed.sum()), int((met & ~passed).sum()))
+    stable = next((block[f"{loop}.stable"] for loop in task.design.controller.stages[:1]), np.ones(count))
+    return Reduction(
+        count, together, int(np.sum(stable == 0.0)), int(np.sum(np.isnan(stable))),
+        {name: Sketch.of(block[name]) for name in task.units},
+        tuple(Tally.of(found, block["sample"]) for found in every),
+    )  # fmt: skip
 
 
 @dataclass(frozen=True)

@@ -195,6 +195,12 @@ class Odds:
     worst_sample: int | None = None  # its number
     columns: tuple[str, ...] = ()  # columns that the requirement looks at
     waiver: Waiver | None = None  # which lets go that it is not proven
+    unresolved: int = 0  # of the samples: rounding decides whether a loop is stable
+
+    @property
+    def failed(self) -> int:
+        """Number of samples that do not meet it."""
+        return self.count - self.passed - self.unresolved
 
 
 @dataclass(frozen=True)
@@ -207,7 +213,7 @@ class WorstCase:
     sample: int
     value: float | None  # after the optimiser; ``None`` where a loop is unstable there
     distance: float | None  # to the limit, positive where it is still met; ``None`` where unstable
-    passed: bool
+    passed: bool | None  # ``None``: rounding decides whether a loop is stable
     parameters: Mapping[str, float]  # SI values of the worst design
     evaluations: int  # designs that the optimiser looked at
     file: Path | None = None  # design file of it
@@ -253,6 +259,8 @@ class MonteCarloResult:
     notes: tuple[str, ...] = ()
     drivers: tuple[Driver, ...] = ()  # of each required figure every tolerance alone, the strongest first
     load_unit: str = "N m"  # of the loads in the names of columns
+    unstable: float = 0.0  # share of the samples whose outermost loop, the drive as a whole, is not stable
+    unresolved: float = 0.0  # and of those where rounding decides whether it is
 
     @property
     def tally(self) -> Tally:
@@ -261,16 +269,11 @@ class MonteCarloResult:
         return Tally.of(map(self.judged, each), [o.waiver is not None for o in each]) + tally(self.left_out)
 
     @property
-    def unstable(self) -> float:
-        """Share of the samples in which the outermost loop, the drive as a whole, is not stable."""
-        kept = [one for name, one in self.columns.items() if name.endswith(".sensitivity_peak")]
-        return kept[-1].missing / kept[-1].count if kept else 0.0  # every stable loop has one
-
-    @property
     def verdict(self) -> Verdict:
-        """That of all requirements; not met also where fewer drives than are enough are stable."""
-        lost = self.unstable > (0.0 if self.at_least is None else 1.0 - self.at_least)
-        return Verdict.NOT_MET if lost else self.tally.verdict
+        """That of all requirements, and of whether enough drives are stable."""
+        most = 0.0 if self.at_least is None else 1.0 - self.at_least
+        told = None if self.unstable <= most < self.unstable + self.unresolved else self.unstable <= most
+        return (self.tally + Tally.of([Verdict.of(told)])).verdict
 
     def case(self, odds: Odds) -> WorstCase | None:
         """The worst case of a requirement, where one was sought."""
@@ -284,8 +287,9 @@ class MonteCarloResult:
     def judged(self, odds: Odds) -> Verdict:
         """Whether a requirement is met: in every sample and the worst case, or as often as is enough."""
         case = self.case(odds)
-        if self.at_least is None and (case is not None or odds.passed < odds.count):
-            return Verdict.of(odds.passed == odds.count and case is not None and case.passed)
+        if self.at_least is None and (case is not None or odds.failed):
+            told = case.passed if case is not None and not odds.unresolved else None
+            return Verdict.of(False if odds.failed or (case and case.passed is False) else told)
         proven, refuted = odds.low >= self.enough, odds.high < self.enough
         return Verdict.of(proven if proven or refuted else None)
 

@@ -13,10 +13,10 @@ from typing import Any
 import numpy as np
 
 from actuator_lti.bounds import SAMPLES
-from actuator_lti.design import with_values, write_design
+from actuator_lti.design import write_design
+from actuator_lti.design.access import varied
 from actuator_lti.design.loader import AnyDesign, as_design
 from actuator_lti.design.model import Design, Requirement
-from actuator_lti.design.tolerances import together
 from actuator_lti.drive.operating import OperatingPoint
 from actuator_lti.errors import InputError
 from actuator_lti.files.atomic import write_bytes
@@ -114,7 +114,7 @@ def monte_carlo(
     tallies = list(zip(judging.judged(design), whole.tallies, strict=True))
     odds = [
         _odds(
-            r.id, words_of(r, r.loop, design.load_unit), r.unit, tally.passed, whole.count,
+            r.id, words_of(r, r.loop, design.load_unit), r.unit, tally, whole.count,
             minimum=r.minimum, maximum=r.maximum,
             nominal=float(judging.judge(r, design, nominal).value[0]), worst=tally.worst[0][2],
             worst_sample=tally.worst[0][1], columns=judging.source_columns(r, design),
@@ -131,6 +131,7 @@ def monte_carlo(
         tuple(odds), tuple(_worst_cases(task, tallies, Path(folder))) if settings.worst_cases else (),
         Path(folder), {name: float(values[0]) for name, values in nominal.items()}, left,
         notes=_notes(task, settings.samples), drivers=_drivers(task, odds), load_unit=design.load_unit,
+        unstable=whole.unstable / whole.count, unresolved=whole.unresolved / whole.count,
     )  # fmt: skip
 
 
@@ -151,9 +152,12 @@ def _drivers(task: SampleTask, odds: Sequence[result.Odds]) -> tuple[result.Driv
     return tuple(sorted(made, key=lambda one: (names.index(one.column), -one.swing)))
 
 
-def _odds(id: str, words: str, unit: str, passed: int, count: int, **more: Any) -> result.Odds:
-    bounds = result.clopper_pearson(passed, count)
-    return result.Odds(id, words, unit, passed, count, passed / count, *bounds, **more)
+def _odds(id: str, words: str, unit: str, tally: Tally, count: int, **more: Any) -> result.Odds:
+    """What is not resolved counts as failed in the lower bound, as passed in the upper one."""
+    passed, unresolved = tally.passed, tally.unresolved
+    low, high = (result.clopper_pearson(n, count)[k] for k, n in enumerate((passed, passed + unresolved)))
+    more["unresolved"] = unresolved
+    return result.Odds(id, words, unit, passed, count, passed / count, low, high, **more)
 
 
 def _reduced(task: SampleTask, store: Store, samples: int, engine: Engine, progress: Progress) -> Reduction:
@@ -191,7 +195,7 @@ def _worst_cases(
         case = worst_case(task.of(requirement), requirement, samples)
         name = f"worst-{place:02d}-{slug(requirement.id)}"
         title = f"{design.title or design.name}: worst case for {requirement.id}"
-        changed = with_values(design, together(design, case.parameters), check=False)
+        changed = varied(design, case.parameters)
         titled = replace(changed, name=f"{slug(design.name)}-{name}", title=title)
         path = folder / f"{name}.toml"
         write_bytes(path, write_design(titled).encode())

@@ -17,9 +17,9 @@ import numpy as np
 
 from actuator_lti.asked.quantities import DRIVE_QUANTITIES, LOOP_QUANTITIES, QUANTITIES, judged_loops
 from actuator_lti.batch import Population, drive_figures, linear_figures, variable_paths
-from actuator_lti.design import design_hash, with_values
+from actuator_lti.design import design_hash
+from actuator_lti.design.access import varied
 from actuator_lti.design.model import Design, Requirement
-from actuator_lti.design.tolerances import together
 from actuator_lti.drive.operating import OperatingPoint
 from actuator_lti.errors import InputError, finite_number
 from actuator_lti.files.atomic import write_bytes
@@ -245,4 +245,4 @@ def replay(design: Design, sampler: Sampler, number: int) -> Design:
     """The design of one sample, by its number."""
     values = sampler.draw(number, 1)[0]
     changes = {path: float(v) for path, v in zip(sampler.paths, values, strict=True)}
-    return with_values(design, together(design, changes), check=False)
+    return varied(design, changes)

@@ -147,7 +147,7 @@ def _score(factor: Factor, value: np.ndarray, group: Group) -> np.ndarray:
 MOST_CORNERS = 1024
 GENERATIONS = 40  # of the evolution
 STEP = float(np.cbrt(np.finfo(float).eps))  # of differences, of the whole range
-_UNSTABLE = -1e6  # stands for a distance of - infinity, so that the optimiser can compare
+_FAR = 1e6  # stands for an infinite distance (of a drive that is not stable: below 0), to be compared
 
 
 def corners(size: int, seed: int) -> np.ndarray:
@@ -166,8 +166,8 @@ def worst_case(task: SampleTask, requirement: Requirement, worst_samples: np.nda
         nonlocal looked_at
         points = region.values(np.atleast_2d(unit.T))
         looked_at += len(points)
-        judged = judge(requirement, task.design, task.figures(points)).distance
-        return np.where(np.isneginf(judged), _UNSTABLE, judged)
+        judged = judge(requirement, task.design, task.figures(points)).resolved
+        return np.where(np.isinf(judged), np.copysign(_FAR, judged), judged)
 
     drawn = np.vstack([task.sampler.draw(int(k), 1) for k in worst_samples])
     pool = np.vstack([corners(region.dimensions, task.sampler.seed), region.cube(drawn)])
@@ -180,7 +180,7 @@ def worst_case(task: SampleTask, requirement: Requirement, worst_samples: np.nda
         sample=int(worst_samples[0]),
         value=float(both.value[1]) if np.isfinite(both.distance[1]) else None,
         distance=finite(both.distance[1]),
-        passed=bool(both.passed[1]),
+        passed=None if both.unresolved[1] else bool(both.passed[1]),
         parameters=dict(zip(task.sampler.paths, point.tolist(), strict=True)),
         evaluations=looked_at,
     )

@@ -219,7 +219,10 @@ def problem_of(
     elements: tuple[Element, ...] = (),
     most: int = MOST_DESIGNS,
 ) -> Problem:
-    """The problem: gains and new elements, searched from ``start`` (by rules, SI) or where they are."""
+    """The problem: gains and new elements, searched from ``start`` (by rules, SI) or where they are.
+
+    An `InputError` where the design has no gain: a law of its own alone.
+    """
     design, placed = place(design, elements)
     variables = []
     for path in (path for path in GAINS if path in set(paths_of(design))):
@@ -228,6 +231,11 @@ def problem_of(
         least, largest = allowed_range(design, path)
         low, high = max(min(begin, home) / SPAN, least), min(max(begin, home) * SPAN, largest)
         variables.append(Variable(path, begin, min(low, high), max(low, high), home))
+    if not variables:
+        stage, _ = design.controller.own_law or ("", None)
+        raise InputError(
+            f"nothing to tune: control.{stage}.law stays as it is, and no other stage has a gain"
+        )
     return Problem(design, requirements, (*variables, *placed), elements, most)
 
 

@@ -8,9 +8,8 @@ import numpy as np
 from actuator_lti.asked.quantities import QUANTITIES
 from actuator_lti.asked.verdict import Tally, Verdict
 from actuator_lti.batch import Population
-from actuator_lti.design import with_values
+from actuator_lti.design.access import varied
 from actuator_lti.design.model import Design, Requirement
-from actuator_lti.design.tolerances import together
 from actuator_lti.loops import assemble_loops
 from actuator_lti.types import Floats
 from analyses.comparison.found import LargeSignal
@@ -129,7 +128,7 @@ def confirm(
             rows.setdefault(tuple(sorted(result.corner.items())), []).append(item)
     verdicts = [*evaluate_requirements(tuned, all_loop_figures(assemble_loops(tuned), certify=True))]
     for corner, asked in rows.items():
-        design = with_values(tuned, together(tuned, dict(corner)), check=False)
+        design = varied(tuned, dict(corner))
         figures = all_loop_figures(assemble_loops(design), step=timed, certify=True)
         for requirement in asked:
             found = judged(design, requirement, figures, lambda name: (None, f"{name}: no figure of a loop"))

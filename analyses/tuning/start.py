@@ -19,6 +19,8 @@ from actuator_lti.design.plant import torque_per_command
 from actuator_lti.drive.facts import resonance_rad_s
 from actuator_lti.drive.steady import own_drag_Nms_rad
 from actuator_lti.errors import InputError
+from actuator_lti.loops import assemble_loops
+from actuator_lti.margins import stability_margins
 from actuator_lti.types import Floats
 
 WIDE = 2.0 + 3.0**0.5  # a of the symmetric optimum for a phase margin of 60 deg
@@ -85,8 +87,8 @@ def _by_rule(design: Design) -> Iterator[tuple[str, float, float | None, str]]:
         gain, time = symmetric_optimum(torque / J, small, WIDE)
         words = f"symmetric optimum for 60 deg, T_sigma {small * 1e6:.4g} us"
         yield "velocity", gain, None if control.velocity.integral_time_s is None else time, words
-        crossover = 1.0 / (WIDE * small)
         if control.position is not None:
+            crossover = _crossover_of_law(design) or 1.0 / (WIDE * small)
             words = f"velocity crossover {crossover:.4g} rad/s over {SEPARATION:g}"
             yield "position", crossover / SEPARATION, None, words
     elif control.position is not None:  # |controller * drive| = 1 at a tenth of 1/T_sigma or below
@@ -96,6 +98,15 @@ def _by_rule(design: Design) -> Iterator[tuple[str, float, float | None, str]]:
         response = torque * abs(complex(1.0, omega * lead_s)) / (J * abs(complex(corner, omega)) * omega)
         words = f"no velocity loop; crossover of the drive at {omega:.4g} rad/s"
         yield "position", 1.0 / response, None, words
+
+
+def _crossover_of_law(design: Design) -> float | None:
+    """Where the velocity loop of a law of one's own first passes a gain of 1, rad/s; None of any other."""
+    own = design.controller.own_law
+    if own is None or own[0] != "velocity":
+        return None
+    found = stability_margins(assemble_loops(design).present["velocity"].plain_open).phase_margins
+    return min((one.frequency_rad_s for one in found), default=None)
 
 
 def object_of(design: Design, path: str) -> KnownObject | None:

@@ -7,6 +7,7 @@ from typing import Any, Literal
 
 from actuator_lti.design.model import Command, CurrentLoop, Design, Instruments, Limits
 from actuator_lti.drive.signals import CLAMP_OF, LIMITERS
+from actuator_lti.drive.steady import fed_forward
 from actuator_lti.drive.wiring import COMMANDS, wire
 from analyses.validation.row import WITHIN, Row, judged
 from analyses.validation.torque_values import edge
@@ -125,7 +126,7 @@ def _windup(pair: Pair, stage: str) -> Iterator[Row]:
     elif model.anti_windup == "back-calculation":
         extra = 0.0
         if isinstance(model, CurrentLoop):
-            extra = model.resistance_feedforward * (pair.model.effective_motor.resistance_ohm or 0.0) * asked
+            extra = fed_forward(pair.model)[0] * asked
         over = limit - gain * asked - integral - extra
         wanted = integral + T / (model.tracking_time_s or model.integral_time_s) * over
     yield judged(

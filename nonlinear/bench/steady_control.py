@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from actuator_lti.design.model import Design
-from actuator_lti.drive.steady import filtered, winding
+from actuator_lti.drive.steady import fed_forward, filtered
 
 if TYPE_CHECKING:
     from nonlinear.bench.operating_motion import OperatingMotion
@@ -54,15 +54,6 @@ def steady_state(design: Design, bias: OperatingMotion, stage: str, wanted: floa
     if loop.integral_time_s is not None:
         return Steady(seen, rest, output)
     return Steady(seen + rest / (gain + direct), 0.0, output)
-
-
-def fed_forward(design: Design) -> tuple[float, float]:
-    """What the current stage adds to the voltage, per current command in ohm and per speed in V s/rad."""
-    loop = design.controller.current
-    if loop is None:
-        return 0.0, 0.0
-    R, _, kE = winding(design.effective_motor)
-    return loop.resistance_feedforward * R, loop.back_emf_feedforward * kE
 
 
 @dataclass(frozen=True)

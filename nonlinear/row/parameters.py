@@ -11,6 +11,7 @@ from actuator_lti.design.model import AntiWindup, CurrentLoop, Design, FilterPla
 from actuator_lti.design.over_angle import OverAngle
 from actuator_lti.design.plant import torque_per_command
 from actuator_lti.drive.signals import LIMITERS
+from actuator_lti.drive.steady import winding
 from actuator_lti.errors import InputError
 from actuator_lti.types import Floats
 from nonlinear._kernels import layout as at
@@ -166,8 +167,9 @@ def _controllers(design: Design, row: Floats) -> None:
             raise InputError(message, where=design.name)
         row[at.HAS_CURRENT] = 1.0
         _regulator(row, at.CURRENT_GAIN, at.CURRENT_WINDUP, current.gain_V_A, current, Ts)
-        row[at.BACK_EMF_FEEDFORWARD] = current.back_emf_feedforward * row[at.BACK_EMF]
-        row[at.RESISTANCE_FEEDFORWARD] = current.resistance_feedforward * row[at.RESISTANCE]
+        R, _, kE = winding(design.controller_model.effective_motor)
+        row[at.BACK_EMF_FEEDFORWARD] = current.back_emf_feedforward * kE
+        row[at.RESISTANCE_FEEDFORWARD] = current.resistance_feedforward * R
     _position(design, row)
     _own_law(design, row)
 
@@ -241,9 +243,9 @@ def _position(design: Design, row: Floats) -> None:
     row[at.DERIVATIVE] = loop.gain * loop.derivative_time_s
     row[at.DERIVATIVE_COEFFICIENT] = T / (loop.derivative_filter_s + T)
     row[at.FRICTION_FEEDFORWARD] = loop.friction_feedforward
-    row[at.ACCELERATION_FEEDFORWARD] = (
-        loop.acceleration_feedforward * row[at.INERTIA] / (torque_per_command(design) * T**2)
-    )
+    model = design.controller_model
+    needed = loop.acceleration_feedforward * model.inertia_kgm2
+    row[at.ACCELERATION_FEEDFORWARD] = needed / (torque_per_command(model) * T**2)
     if loop.sensor == "output":
         row[at.OUTPUT_SENSOR] = 1.0
         quantum = design.output_quantum_rad

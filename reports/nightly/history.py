@@ -25,6 +25,7 @@ from reports.nightly.text import one_line, sha256
 
 SCHEMA: Final = "actuator-lti/nightly-history"
 VERSION = 1
+_REMEDY = f"restore it from a copy, or move {INDEX} away and begin anew on purpose with --accept-lost-history"
 Shape = TypeVar("Shape")
 Reported = tuple[Sequence[Figure], dict[str, Any]]  # figures and inputs
 
@@ -185,7 +186,7 @@ def open_history(state: Path) -> History:
     try:
         head = _HEAD.validate_json(data, strict=True)
     except ValidationError as error:
-        raise InputError("is no history of a nightly build", where=str(path)) from error
+        raise InputError(f"is no history of a nightly build: {_REMEDY}", where=str(path)) from error
     if head.version > VERSION:
         told = f"has version {head.version}, this actuator-lti knows up to {VERSION}: use a newer one"
         raise InputError(told, where=str(path))
@@ -214,4 +215,4 @@ def _valid(shape: TypeAdapter[Shape], data: bytes, path: Path) -> Shape:
 
 
 def _damaged(path: Path, what: str) -> InputError:
-    return InputError(f"is damaged ({what}): restore it from a copy", where=str(path))
+    return InputError(f"is damaged ({what}): {_REMEDY}", where=str(path))

@@ -22,6 +22,7 @@ from reports.verdict_summary import why
 
 _SHOWN = (1, 5, 50, 95, 99)  # per cent
 _MET_WITHIN = ": met within the tolerances"
+UNRESOLVED = "not resolved in double precision"
 NAMED = 3  # requirements that a note on the terminal names; of more it says how many
 
 
@@ -83,8 +84,10 @@ def _result(result: MonteCarloResult) -> str:
 
 
 def _lost(result: MonteCarloResult) -> str:
-    share = f"{100.0 * result.unstable:.3g} %"
-    return f" The drive is not stable in {share} of the samples." if result.unstable else ""
+    told = {"The drive is not stable": result.unstable, f"Its stability is {UNRESOLVED}": result.unresolved}
+    return "".join(
+        f" {words} in {100.0 * share:.3g} % of the samples." for words, share in told.items() if share
+    )
 
 
 def _verdicts(result: MonteCarloResult) -> list[doc.VerdictItem]:
@@ -108,6 +111,9 @@ def _verdict(result: MonteCarloResult, odds: Odds) -> doc.VerdictItem:
 
 def _why(result: MonteCarloResult, odds: Odds) -> str:
     case, verdict = result.case(odds), result.judged(odds)
+    if verdict is Verdict.NOT_PROVEN and (odds.unresolved or (case is not None and case.passed is None)):
+        where = f"{odds.unresolved} of {odds.count} samples" if odds.unresolved else "the worst case"
+        return f"stability is {UNRESOLVED} in {where}"
     if verdict is Verdict.NOT_PROVEN:
         needed = samples_needed(result.enough)
         most = "no number of samples" if math.isinf(needed) else f"at least {needed} samples, if all pass,"
@@ -120,8 +126,8 @@ def _why(result: MonteCarloResult, odds: Odds) -> str:
         met = verdict is Verdict.MET
         bound = f"at least {100 * odds.low:.3f}" if met else f"at most {100 * odds.high:.3f}"
         return f"{bound} % with 95 % confidence"
-    if odds.passed < odds.count:
-        return f"{odds.count - odds.passed} of {odds.count} samples fail, worst is number {odds.worst_sample}"
+    if odds.failed:
+        return f"{odds.failed} of {odds.count} samples fail, worst is number {odds.worst_sample}"
     if case is None or verdict is Verdict.MET:
         return ""
     if case.value is None:

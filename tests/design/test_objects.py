@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from actuator_lti.design import load_design, read_design_text, with_values, write_design
-from actuator_lti.design.model import ControllerObject, ControllerObjects
+from actuator_lti.design.model import ControllerObject, ControllerObjects, Filter
 from actuator_lti.design.objects import OBJECTS, PER_RPM, calibration, export_objects, import_objects
 from actuator_lti.design.settings_file import (
     parse_label,
@@ -46,6 +46,39 @@ def test_the_baseline_in_the_units_of_the_objects_and_what_was_rounded() -> None
     assert rounded["0x6080.00"].exact == pytest.approx(942.5 * 30 / pi)
     assert rounded["0x232A.03"].exact == pytest.approx(5.25e-6 * 2 * pi / 60 * 1e12)
     assert "rounded to 9000 rpm" in str(rounded["0x6080.00"])
+
+
+@pytest.mark.parametrize(
+    ("constants", "torque", "back_emf", "impedance"),
+    [("rms-line", 1.5**-0.5, 2**0.5, 1), ("peak-phase", 2 * 3**-0.5, 3**0.5, 2)],
+)
+def test_an_ac_motor_is_that_of_the_amperes_of_its_limits(
+    constants: Any, torque: float, back_emf: float, impedance: int
+) -> None:
+    """kM, R and L of the model's DC motor (model.md section 1), whose amperes limits and gains count."""
+    motor = replace(AMBER.motor, constants=constants, back_emf_constant_Vs_rad=5.9e-3 * torque / back_emf)
+    design = replace(AMBER, motor=motor)
+    written = {item.label: item.value for item in export_objects(design).objects.values}
+    assert written["0x2329.04"] == round(5900 * torque)
+    assert (written["0x2329.05"], written["0x232A.01"]) == (6 * impedance, 55 * impedance)
+    assert import_objects(objects({"0x2329.04": written["0x2329.04"]}), design).changed == ()
+    other = import_objects(objects({"0x2329.04": 9000, "0x232A.01": 80}), design).design
+    assert other.motor.torque_constant_Nm_A == pytest.approx(9e-3 / torque)
+    assert other.motor.back_emf_constant_Vs_rad == pytest.approx(9e-3 / back_emf)
+    assert other.motor.resistance_ohm == pytest.approx(0.08 / impedance)
+
+
+def test_what_no_object_holds_is_named() -> None:
+    notch = Filter(kind="notch", frequency_rad_s=1e3, width_rad_s=1e3)
+    control = AMBER.controller
+    velocity = replace(control.velocity, filters=(notch,))
+    design = replace(AMBER, controller=replace(control, velocity=velocity))
+    filtered = with_values(design, {"control.position.integral_time": 0.5})
+    assert (
+        "no object holds, so not written: control.velocity.filter.1, control.position.integral_time"
+        in export_objects(filtered).notes
+    )
+    assert not any("no object" in note for note in export_objects(AMBER).notes)
 
 
 def test_a_design_survives_export_and_import() -> None:

@@ -14,6 +14,7 @@ from scipy.io import loadmat
 
 from actuator_lti import assemble_loops, load_design, stability_margins
 from actuator_lti.asked.drive_figure import drive_figure
+from actuator_lti.design import write_design
 from actuator_lti.design.access import parameter_value, paths_of, stacked
 from actuator_lti.design.model import Design
 from actuator_lti.loops import exact_margins
@@ -98,6 +99,20 @@ def responds_alike(found: Any, known: Any) -> bool:
     w = np.geomspace(0.1, 3000.0, 40)
     points = np.exp(1j * w * known.dt) if known.dt else 1j * w
     return same(found(points), known(points)) and tuple(found.states) == tuple(known.states)
+
+
+def test_it_says_which_forms_there_are_and_that_the_command_is_behind_its_mean(cli, tmp_path) -> None:
+    """The screw's jerk is limited by a mean over 2 * 4/(100 * 0.5 ms) samples; a law has one form."""
+    told = cli.text("export", "linear", "ballscrew", "--out", path := tmp_path / "screw.json")
+    assert "mean of 160 samples" in told
+    assert "sampled and continuous" in told
+    assert read(path)["sampled"]["responses"]["command"]["behind_mean_of_samples"] == 160
+    law = load_design("emps").with_law("position", ([], [], [], [[300.0]], 1e-3), inputs=["error"])
+    (own := tmp_path / "own.toml").write_text(write_design(law), encoding="utf-8")
+    told = cli.text("export", "linear", own, "--out", path := tmp_path / "own.json")
+    assert ", sampled, " in told
+    assert "mean" not in told
+    assert read(path)["sampled"]["responses"]["command"]["behind_mean_of_samples"] == 1
 
 
 def test_the_python_file_makes_python_control_systems(written) -> None:

@@ -121,6 +121,17 @@ def test_the_history_of_an_earlier_version_is_refused_and_left(site) -> None:
     assert earlier.is_file()
 
 
+@pytest.mark.parametrize("damaged", [INDEX, "nights/000001.json"])
+@pytest.mark.parametrize("text", ["{", "{}"])
+def test_what_is_damaged_says_how_to_begin_anew(site, damaged: str, text: str) -> None:
+    (state(site) / damaged).write_text(text)
+    for settings in (INLINE, AGAIN):  # nothing is thrown away by itself
+        refused(night, site, 3.0, settings, words=(damaged, f"move {INDEX} away", "--accept-lost-history"))
+    (state(site) / INDEX).rename(state(site) / "damaged.json")
+    night(site, 12.0, AGAIN)
+    night(site, 12.0)
+
+
 def test_any_damage_is_told_or_harmless(site) -> None:
     """Bytes are overwritten, cut off and inserted: every text and number is held by a checksum."""
     paths = [state(site) / INDEX, *sorted((state(site) / "nights").iterdir())]

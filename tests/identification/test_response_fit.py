@@ -10,7 +10,7 @@ import pytest
 from scipy.linalg import expm
 from scipy.optimize import least_squares
 
-from actuator_lti.design import load_design, model, parameter_value, write_design
+from actuator_lti.design import load_design, model, parameter_value, read_design_text, write_design
 from actuator_lti.errors import InputError
 from actuator_lti.types import Floats
 from analyses.estimation.parameters import own_std
@@ -61,8 +61,9 @@ def _rigid(hertz: np.ndarray) -> np.ndarray:
 
 
 def _sampled(hertz: np.ndarray, a: np.ndarray, b: np.ndarray, d: float) -> np.ndarray:
-    """P control of the first state of dx/dt = a x + b u."""
-    n = len(b)
+    """P control of the first state of dx/dt = a x + b u, behind any delay."""
+    n, whole_ticks = len(b), int(d / TICK)
+    d -= whole_ticks * TICK
 
     def held(span: float) -> tuple[np.ndarray, np.ndarray]:
         whole = expm(np.block([[a, b[:, None]], [np.zeros((1, n + 1))]]) * span)
@@ -72,7 +73,8 @@ def _sampled(hertz: np.ndarray, a: np.ndarray, b: np.ndarray, d: float) -> np.nd
     rest, new = held(TICK - d)
     old = rest @ held(d)[1]
     z = np.exp(2j * np.pi * hertz * TICK)
-    return np.array([GAIN * np.linalg.solve(s * np.eye(n) - whole, new + old / s)[0] for s in z])
+    late = z**-whole_ticks
+    return late * [GAIN * np.linalg.solve(s * np.eye(n) - whole, new + old / s)[0] for s in z]
 
 
 HERTZ = np.geomspace(0.5, 400.0, 60)
@@ -399,3 +401,45 @@ def test_a_stiffness_from_below_the_antiresonance_is_not_proven(tmp_path) -> Non
     assert re.search(r"measured to 18 Hz, the antiresonance is at 2\d.* of the design's 1800", item.reason)
     whole = identify_response(_design(off), _measured(tmp_path, "L", 1e-3, 0))
     assert not [one for one in whole.items if one.id == "reach"]
+
+
+WINDING = f"""
+design.name = "winding"
+motor = {{ resistance = "0.5 ohm", inductance = "2 mH", torque_constant = "0.05 N*m/A", \
+          back_emf_constant = "0.05 V*s/rad", rotor_inertia = "2e-5 kg*m^2" }}
+friction.viscous = "1e-3 N*m*s/rad"
+limits.voltage = "24 V"
+control = {{ period = "1 ms", computing_delay = "1 ms", current.gain = "{GAIN} V/A" }}
+"""
+
+
+def _current_loop(hertz: np.ndarray, delay: float) -> np.ndarray:
+    """Of R 0.5, L 2e-3, kE = kM 0.05, J 2e-5 and Cv 1e-3, in SI: (u - R i - kE w)/L, (kM i - Cv w)/J."""
+    return _sampled(hertz, np.array([[-250.0, -25.0], [2500.0, -50.0]]), np.array([500.0, 0.0]), delay)
+
+
+@pytest.mark.parametrize("ticks", [0.1, 1.7, 1.86, 1.93, 2.4])
+def test_a_delay_is_found_from_the_other_side_of_a_whole_tick(ticks: float, tmp_path) -> None:
+    """From a delay of 1 tick the search passed 2 and stayed: 2.2 ms in place of 1.7, inertia 6 % off."""
+    hertz = np.geomspace(1.0, 470.0, 60)
+    seen = _noisy(_current_loop(hertz, 1e-3 * ticks), 0.01, 1)
+    result = identify_response(read_design_text(WINDING), _written(tmp_path, hertz, seen, 0.01))
+    truth = {"motor.rotor_inertia": 2e-5, "friction.viscous": 1e-3, "control.computing_delay": 1e-3 * ticks}
+    assert result.passed
+    for key, value in truth.items():
+        low, high = result.fit.interval(key)
+        assert low <= value <= high, key
+        assert high - low < 0.06 * value
+
+
+def test_a_drive_that_is_not_stable_was_not_measured(tmp_path) -> None:
+    """T of a delay beyond the delay margin, of the crossover: such a drive was found, and passed."""
+    hertz, fine = np.geomspace(1.0, 470.0, 60), np.linspace(50.0, 90.0, 4001)
+    loop, start = _current_loop(hertz, 4.85e-3), WINDING.replace('delay = "1 ms', 'delay = "4.2 ms')
+    at = fine[np.flatnonzero(np.diff(np.abs(_current_loop(fine, 0.0)) < 1.0))]
+    margin = (np.pi + np.angle(_current_loop(at, 0.0))) / (2.0 * np.pi * at)
+    assert 4.2e-3 < margin.item() < 4.85e-3
+    file = _written(tmp_path, hertz, loop / (1.0 + loop), 0.01)
+    result = identify_response(read_design_text(start), file, of="T")
+    assert result.fit["control.computing_delay"] < margin
+    assert not result.passed

@@ -14,10 +14,12 @@ from scipy.signal import place_poles
 from actuator_lti import Design, assemble_loops, load_design, plant, stability_margins
 from actuator_lti.batch import Population, linear_figures
 from actuator_lti.compiled.compiler import system_compiler
-from actuator_lti.design.model import Encoder, PositionLoop
+from actuator_lti.design.model import Encoder, PositionLoop, Requirement
 from actuator_lti.drive.steady import torque_gain_Nm_rad
+from actuator_lti.errors import InputError
 from analyses import survey_loops, validate
 from analyses.linear.code_check import check_code
+from analyses.tuning import tune
 from analyses.tuning.start import rule_gains
 from analyses.validation import CHECKS, QUICK
 from reports.live.keys import followed
@@ -154,6 +156,24 @@ def test_it_stays_as_it_is_while_the_rest_moves(stage: str) -> None:
     gains = rule_gains(design).values
     assert others <= set(gains)
     assert not any(path.startswith(f"control.{stage}.") for path in gains)
+
+
+def test_the_rule_of_the_position_takes_the_crossover_of_the_law_inside() -> None:
+    """Not that of the symmetric optimum, which is not run: |L| of the law is 1 at four times the gain."""
+    design = lead("velocity")
+    gain = rule_gains(design).values["control.position.gain"]
+    loop, period = (
+        assemble_loops(design).present["velocity"].open_loop,
+        design.controller.period_of("velocity"),
+    )
+    assert abs(loop(np.exp(4j * gain * period))) == pytest.approx(1.0, rel=1e-9)
+
+
+def test_a_law_alone_leaves_nothing_to_tune() -> None:
+    asked = Requirement(id="phase", quantity="phase_margin", unit="deg", loop="every", minimum=30.0)
+    alone = controlled(lead("current"), velocity=None, position=None)
+    with pytest.raises(InputError, match=r"nothing to tune: control.current.law stays"):
+        tune(replace(alone, requirements=(asked,)))
 
 
 def test_a_key_that_a_drive_may_not_have_has_no_slider() -> None:

@@ -1,7 +1,7 @@
 """The controller of model.md sections 2 and 7 in plain Python, written from the equations alone."""
 
 from collections import deque
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import inf, log, sqrt, tan
 
 import numpy as np
@@ -150,6 +150,7 @@ class Controller:
 
     def __init__(self, design: Design) -> None:
         self.design, c = design, design.controller
+        self.sheet = replace(design, temperature=None).effective_motor  # what feed-forward is computed with
         self.Ts, self.k = c.period_s, 0
         self.n_v = c.velocity.every if c.velocity else 1
         self.n_p = c.position.every if c.position else self.n_v
@@ -209,7 +210,7 @@ class Controller:
         return self.limit_outer(direct + self.I)
 
     def torque_gain(self) -> float:
-        m = self.design.effective_motor
+        m = self.sheet
         if m.source_gain_Nm_V is not None:
             return m.source_gain_Nm_V
         return m.torque_constant_Nm_A / (1.0 if self.pi_c else m.resistance_ohm)
@@ -230,7 +231,7 @@ class Controller:
             self.i_max = min(self.i_max, limits.continuous_current_A)
 
     def tick(self, command: float, i: float, w: float, th: float, y: float) -> float:
-        c, limits, m = self.design.controller, self.design.limits, self.design.effective_motor
+        c, limits, m = self.design.controller, self.design.limits, self.sheet
         self.overload(i)
         if self.k % self.n_p == 0:
             r = self.profile(command)

@@ -27,8 +27,9 @@ from analyses.monte_carlo.judging import (
 from analyses.monte_carlo.result import MOST, clopper_pearson
 from analyses.specification.requirements import evaluate_requirements
 from analyses.studies.engine import Engine
-from analyses.studies.sampling import sampler_of
+from analyses.studies.sampling import Table, sampler_of
 from reports.sections.monte_carlo import brief, section
+from tests.changed import changed
 from tests.refusals import refused
 from tests.reports.live_page import opened
 
@@ -316,3 +317,27 @@ def test_drives_that_are_not_stable_do_not_pass_whatever_is_required(tmp_path) -
         assert words in brief(result).words
         missing = [result.columns[f"{loop}.gain_margin"].missing for loop in ("velocity", "position")]
         assert missing == [0, 60 if words else 0]  # it has no margins, as `margins` says of one design
+
+
+def test_a_drive_whose_stability_rounding_decides_is_not_called_unstable(tmp_path) -> None:
+    """Current gain times 60 at 20 ticks a position update: entries of 5e14, withheld as `margins` does."""
+    base = replace(load_design("ilr33-amber-multirate"), requirements=())
+    base = changed(base, controller={"position": {"every": 20}})
+    gain, wanted = base.controller.current.gain_V_A, {"loop": "position", "minimum": 1.0, "unit": "deg"}
+    base = replace(base, requirements=(Requirement(id="phase", quantity="phase_margin", **wanted),))
+    table = Table(("control.current.gain",), gain * np.array([[1.0], [60.0], [0.7]]), "a file")
+    settings = replace(PLAIN, samples=96, table=table)
+    result = monte_carlo(base, tmp_path / "all", settings)
+    phase = result.odds[0]
+    assert (result.unstable, phase.failed) == (0.0, 0)
+    assert 0.2 < result.unresolved == phase.unresolved / 96 < 0.5
+    assert phase.high == 1.0 > phase.low
+    assert result.verdict == result.judged(phase) == "not proven"
+    assert "not stable in" not in brief(result).words
+    text = json.dumps(section(result))
+    assert f"stability is not resolved in double precision in {phase.unresolved} of 96 samples" in text
+    # that two thirds are met is shown; that nine in ten are is neither shown nor refuted
+    for share, verdict in ((0.5, "met"), (0.9, "not proven")):
+        assert replace(result, at_least=share).judged(phase) == verdict
+    lost = replace(base, requirements=(replace(base.requirements[0], minimum=89.0),))
+    assert monte_carlo(lost, tmp_path / "lost", settings).verdict == "not met"

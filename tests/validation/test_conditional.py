@@ -83,6 +83,21 @@ def test_it_goes_away_with_the_limit_or_with_knowledge_of_it() -> None:
     assert step_threshold(free) == (None, None)
 
 
+def test_a_current_loop_without_an_integral_is_asked_for_more_than_flows() -> None:
+    """P loop of R/2: i = i_ref/3. U/R = 12 A takes i_ref = 36 A, so a limit of 20 A acts first."""
+    current = {"gain_V_A": 0.5, "integral_time_s": None}
+    loops = {"current": current, "velocity": {"gain": 3.0 * DESIGN.controller.velocity.gain}}
+    for most, limit, name in ((inf, 36.0, "voltage limit as a current, U/R"), (20.0, 20.0, "current limit")):
+        design = changed(DESIGN, controller=loops, limits={"peak_current_A": most})
+        (found,) = [one for one in looked(design).predictions if one.point == "i_ref"]
+        assert (found.limit, found.limiter) == (pytest.approx(limit), name)
+        assert found.antiwindup is (name == "current limit")
+        s, back_emf = 2j * pi * found.frequency_hz, 0.02**2 / 1.5  # kM kE/(R + Kp), N m s/rad
+        behind = found.gain_lower * found.amplitude * 0.02 / 3.0  # N m, the fundamental
+        drag = DESIGN.friction.viscous_Nms_rad + back_emf
+        assert found.output_rad == pytest.approx(behind / abs(1e-3 * s**2 + drag * s), rel=1e-9)
+
+
 @pytest.mark.parametrize("name", ["ilr33-amber", "ilr33-amber-multirate", "ctms-motor-position", "emps"])
 def test_shipped_designs_settle_from_every_step(name: str) -> None:
     result = looked(load_design(name))
