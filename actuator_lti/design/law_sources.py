@@ -97,10 +97,13 @@ def law_tree(A: Any, B: Any, C: Any, D: Any, L: Any = (), period_s: Any = None) 
     for name in ("C", "D"):
         if parts[name].ndim > 2 or (parts[name].ndim == 2 and len(parts[name]) > 1):
             raise InputError(f"{name}: {_shape(parts[name])}; allowed: one row, a law has one output")
-    if n and parts["B"].size % n:
+    B = (
+        parts["B"].reshape(n, 1) if parts["B"].size == n else np.atleast_2d(parts["B"])
+    )  # a vector as it stands
+    if n and len(B) != n:
         raise InputError(f"B: {_shape(parts['B'])}; allowed: {n} rows, as A has")
     A, C, D, L = parts["A"].reshape(n, n), *(parts[name].ravel() for name in ("C", "D", "L"))
-    B = parts["B"].reshape(n, -1) if n else np.zeros((0, 0))
+    B = B.reshape(n, -1) if n else np.zeros((0, 0))
     beyond = max(np.abs(part).max(initial=0.0) for part in (A, B, C, L)) > BIG
     if beyond and n and C.size == n and L.size in (0, n):
         t = balance(A, np.hstack([B, L.reshape(n, -1)]), C)

@@ -28,6 +28,8 @@ Tree = dict[str, Any]
 INTEGERS = range(-(1 << 63), 1 << 63)
 """What TOML promises to hold; longer ones would become infinite as floats, or take long to print."""
 
+UTF_16 = (b"\xff\xfe", b"\xfe\xff")  # what its texts begin with
+
 _PIECE = 1 << 20
 _HARMLESS = (float, bool, type(None))  # need no look where values are not counted
 _CONTROL = ("Cc", "Cs")
@@ -104,7 +106,7 @@ def read_bytes(path: AnyPath, what: str = "design file", most: Bound = TOML_BYTE
 
 def decode(data: bytes, where: str) -> str:
     """UTF-8 text, with or without a byte-order mark."""
-    if data[:2] in (b"\xff\xfe", b"\xfe\xff"):
+    if data[:2] in UTF_16:
         raise InputError("is UTF-16; allowed: UTF-8 text", where=where)
     try:
         return data.decode("utf-8-sig")

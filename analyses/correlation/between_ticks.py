@@ -112,7 +112,7 @@ def _bent(design: Design, run: Trajectory, tick: Ints, late_s: Floats) -> Floats
     volts = u[np.maximum(tick - whole - 1, 0)], u[np.maximum(tick - whole, 0)]
     columns = np.array([run.current_A, run.motor_speed_rad_s, run.motor_angle_rad])
     begun, ends = columns[:, tick], columns[:, tick + 1]
-    rates, modes = np.linalg.eig(A.astype(np.complex128))
+    rates, modes = np.linalg.eig(A)  # real where the motor does not ring, which takes half the time
     into = np.linalg.inv(modes)
 
     def moved(torque: Floats, until_s: Floats) -> Floats:

@@ -190,8 +190,8 @@ def nearest_run(
 ) -> _Modelled:
     """The reading of a command with which a run is nearest, its notes say what was done; run and signals."""
     readings = driving.readings(driving.needed_command(design, record, command), record)
-    tried = (_run_so(one, record, measured, progress) for one in readings)
-    return min(tried, key=lambda one: _unlikely(one, measured))
+    first, *others = (_run_so(one, record, measured, progress) for one in readings)
+    return min((first, *others), key=lambda one: _unlikely(one, measured)) if others else first
 
 
 def _unlikely(tried: _Modelled, measured: Mapping[str, Floats]) -> float:

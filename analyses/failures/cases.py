@@ -42,7 +42,9 @@ class Rig:
     """The two halves; ``sensing`` changes what the controller gets, ``driving`` the voltage by (u, U_bus)."""
 
     def __init__(self, design: Design, load_Nm: float) -> None:
-        self.design, self.load_Nm = design, load_Nm
+        self.design, self.load_Nm, self.ratio = design, load_Nm, design.total_ratio
+        bends = design.load.over_angle
+        self.own_Nm = bends.at if bends.follows else lambda _: 0.0  # of the load over the output's angle
         self.controller, self.plant = Drive(design), Drive(plant_of(design), load_Nm=load_Nm)
         self.sensing: Sensing | None = None
         self.driving: Driving | None = None
@@ -64,14 +66,14 @@ class Rig:
             current_A=value("current"),
             voltage_V=value("voltage"),
             output_angle_rad=self.output_rad,
-            output_speed_rad_s=value("speed") / self.design.total_ratio if rigid else value("output_speed"),
+            output_speed_rad_s=value("speed") / self.ratio if rigid else value("output_speed"),
         )
 
     @property
     def output_rad(self) -> float:
         """Angle of the output at t_k."""
         rigid = self.design.coupling is None
-        return self.plant.value("angle") / self.design.total_ratio if rigid else self.plant.value("output")
+        return self.plant.value("angle") / self.ratio if rigid else self.plant.value("output")
 
     def whole(self, command: float) -> Running:
         """The drive as one, from rest, under a command that stays: the rig before a failure, bit for bit."""
@@ -87,14 +89,14 @@ class Rig:
 
     def followed(self, piece: Piece) -> Floats:
         """What the command orders, at each tick: position or speed at the output, current, voltage."""
-        return followed_at(self.design.controller.outermost, self.design.total_ratio, piece.signal)
+        return followed_at(self.design.controller.outermost, self.ratio, piece.signal)
 
     @property
     def turning(self) -> dict[str, str]:
         """Speed of the output side and energy of the motor side, in words."""
         speed, design = self.measured().motor_speed_rad_s, self.design
         energy = 0.5 * design.motor_side_inertia_kgm2 * speed**2
-        return {"speed": _size(design, speed / design.total_ratio, "velocity"), "energy": f"{energy:.3g} J"}
+        return {"speed": _size(design, speed / self.ratio, "velocity"), "energy": f"{energy:.3g} J"}
 
     def fail(self, broken: Design) -> None:
         """Go on with another plant from the same angles, speeds, current and voltage."""
@@ -124,9 +126,9 @@ class Rig:
             return self.plant.noted("coupling_torque") * design.ratio_behind_coupling
         if self.jammed:
             return held_moment_Nm(design, float(motor_torque_Nm(design, true.current_A, u)))
-        N, now = design.total_ratio, true.motor_speed_rad_s
+        N, now = self.ratio, true.motor_speed_rad_s
         faster = (self.plant.value("speed") - now) / N / design.controller.period_s
-        own = float(load.over_angle.at(true.motor_angle_rad / N)) - load.moment_damping_Nms_rad * now / N
+        own = float(self.own_Nm(true.motor_angle_rad / N)) - load.moment_damping_Nms_rad * now / N
         return load.inertia_kgm2 * faster - own - self.load_Nm
 
 

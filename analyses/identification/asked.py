@@ -143,7 +143,9 @@ class Asked(Settings):
         if self.frequency_response and len(self.files) != 1:
             raise InputError("--frequency-response takes one record (and --play RECORD for the play)")
         if self.response and len(self.files) != 1:
-            raise InputError("--response takes one file; allowed: CSV or .mat of a frequency response")
+            raise InputError(
+                "--response takes one file; allowed: CSV, JSON, Parquet or .mat of a frequency response"
+            )
         if not self.response and (self.loop is not None or self.response_of != "L" or self.averages):
             raise InputError("--loop, --of and --averages go with --response")
         if (self.response or self.frequency_response) and self.inertia_to != Settings.inertia_to:

@@ -11,7 +11,6 @@ from scipy.stats import chi2
 from actuator_lti.design import parameter_value, paths_of, read_design_text, with_values, write_design
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
-from actuator_lti.files.response import RecordedResponse, read_response
 from actuator_lti.types import Complexes, Progress
 from analyses.estimation.fit import Fit, Fixed
 from analyses.estimation.least_squares import scaled_lstsq
@@ -24,6 +23,7 @@ from analyses.identification.response_search import STEP
 from analyses.identification.to_design import design_with_fit, with_correlations
 from analyses.identification.verdict import Identified, Item, kept_items, simulated_item
 from analyses.records.consistency import NO_CHANCE, SURE
+from analyses.records.response import RecordedResponse, read_response
 from analyses.studies.sampling import correlation_of
 
 KEYS = (
@@ -66,7 +66,7 @@ def identify_response(
     the response does not determine: a standard error above the design's value, and above a quarter of what it
     is off; of a stiffness, or of one of several inertias, no end of its interval within a factor of 30.
 
-    ``source``: as `actuator_lti.files.response.read_response` takes it. ``loop``: a stage (``"position"``) or
+    ``source``: as `analyses.records.response.read_response` takes it. ``loop``: a stage (``"position"``) or
     a break point (``"w_ref"``); the outermost stage by default. ``of``: open loop, L/(1 + L), 1/(1 + L), or
     (closed) from the command to the output with all that is fed forward. ``fixed``: keys held at a value.
     ``limit``: largest relative error of the design's response, root mean square over the frequencies.

@@ -14,13 +14,13 @@ from actuator_lti.design.model import Design
 from actuator_lti.drive.operating import Operating
 from actuator_lti.drive.wiring import Drive, wire
 from actuator_lti.errors import InputError
-from actuator_lti.files.response import RecordedResponse
 from actuator_lti.loops.periodic import phase_blocks, point_blocks
 from actuator_lti.loops.sampled import stage_blocks, whole_path
 from actuator_lti.loops.tick import Block, TickProgram, mean_response
 from actuator_lti.systems.sampling import split_delay
 from actuator_lti.types import Complexes, Floats, Mask
 from analyses.identification.asked import Of
+from analyses.records.response import RecordedResponse
 
 Values = Mapping[str, Floats]  # values in SI by key, each of shape (K,): K designs
 ROUNDED = float(np.finfo(float).eps) ** 0.25  # how far rounding scatters four eigenvalues at 1

@@ -34,8 +34,8 @@ class Asked:
     response: Annotated[
         Path | None,
         Option(
-            "Measured response of a loop, laid over the model: CSV or .mat with frequency, dB and "
-            "deg or real and imaginary part, perhaps coherence or deviation (rms of the complex error "
+            "Measured response of a loop, laid over the model: CSV, JSON, Parquet or .mat with frequency, "
+            "dB and deg or real and imaginary part, perhaps coherence or deviation (rms of the complex error "
             "over the size of the value, or in dB of the gain, in deg of the phase).",
             "FILE",
         ),

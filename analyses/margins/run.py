@@ -10,8 +10,6 @@ from actuator_lti.asked.verdict import Tally, Verdict
 from actuator_lti.design.loader import AnyDesign, as_design
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
-from actuator_lti.files.response import Loop as Kind
-from actuator_lti.files.response import read_response
 from actuator_lti.loops import Loops, assemble_loops
 from actuator_lti.margins import StabilityMargins, stability_margins
 from actuator_lti.measured.response import MeasuredResponse
@@ -20,6 +18,8 @@ from analyses.linear.loop_figures import LoopFigures, all_loop_figures, loop_fig
 from analyses.linear.loop_survey import OperatingPointFigures, operating_points
 from analyses.linear.responses import response_at
 from analyses.margins.asked import Asked
+from analyses.records.response import Loop as Kind
+from analyses.records.response import read_response
 from analyses.specification.requirements import RequirementVerdict, evaluate_requirements, tally
 from analyses.specification.weakest import Spread, spread
 

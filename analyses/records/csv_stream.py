@@ -19,7 +19,7 @@ import numpy as np
 
 from actuator_lti.bounds import CSV_LINE_BYTES, CSV_ROWS
 from actuator_lti.errors import InputError
-from actuator_lti.files.reading import open_regular
+from actuator_lti.files.reading import UTF_16, open_regular
 from actuator_lti.start.extras import need
 from actuator_lti.types import Floats
 from analyses.records.record import Record, RowCounts
@@ -197,7 +197,7 @@ def _line_blocks(stream: BinaryIO, origin: str, digest: hashlib._Hash) -> Iterat
     """Blocks that end at a line end; the last one may lack it."""
     rest, data = b"", stream.read(BLOCK_BYTES)
     digest.update(data)
-    if data[:2] in (b"\xff\xfe", b"\xfe\xff"):
+    if data[:2] in UTF_16:
         raise InputError("is UTF-16; save it as UTF-8", where=origin)
     data = data.removeprefix(b"\xef\xbb\xbf")
     while data:

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from actuator_lti.errors import InputError
-from actuator_lti.files.reading import as_path, open_regular, shown, shown_path
+from actuator_lti.files.reading import UTF_16, as_path, open_regular, shown, shown_path
 from analyses.records.campaign_file import RECORDS, record_spec, records_table
 from analyses.records.csv_stream import STAMP, text_of
 from analyses.records.inputs import spec_of_names
@@ -39,7 +39,6 @@ ODRIVE_SPEC = RecordSpec(
 BESIDE = ("file", "settings", "signals")
 BY_ROW = ("bad_rows", "missing", "disorder", "resample_tolerance")  # keys that describe no column
 HEAD_BYTES = 1 << 16
-UTF_16 = (b"\xff\xfe", b"\xfe\xff")
 PACKED = (b"\x1f\x8b", b"PK", b"BZ", b"\xfd7")
 EMPS_COLUMNS = {"t", "qm", "qg", "vir", "gtau"}
 _DECIMAL_COMMA = re.compile(r"(?:^|[;\t])\s*[+-]?[0-9]+,[0-9]")

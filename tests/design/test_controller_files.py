@@ -10,6 +10,7 @@ from pathlib import Path
 
 import control
 import numpy as np
+import pyarrow.parquet
 import pytest
 import scipy.io
 
@@ -19,7 +20,7 @@ from actuator_lti.design.loader import design_from_tree
 from actuator_lti.design.model import Design
 from actuator_lti.design.objects import Imported
 from actuator_lti.design.writing import design_tree
-from actuator_lti.files.response import RecordedResponse, read_response
+from analyses.records.response import RecordedResponse, read_response
 from reports.cli.main import main
 from tests.refusals import refused
 
@@ -274,6 +275,14 @@ TABLES = [
     (" ", "frequency_kHz abs Phase/deg", (HERTZ / 1e3, np.abs(L), DEG)),
     (",", "w_rad_s,Re(L),Im(L)", (OMEGA, L.real, L.imag)),
     (",", "", (HERTZ, DB, DEG)),
+    (
+        ",",
+        "# omega [rad/s],Re,Im",
+        (OMEGA, L.real, L.imag),
+    ),  # as numpy.savetxt has it, read as Hz, dB, deg before
+    (" ", "! bench\n! f_mHz abs phase_mrad", (HERTZ * 1e3, np.abs(L), np.angle(L) * 1e3)),
+    (";", "Made by;a bench;\nf;Mag;Phase\n[1/min];[dB];[rev]", (HERTZ * 60.0, DB, DEG / 360.0)),
+    ("\t", "FREQ RAD/S\tMAG DB\t\u00b0", (OMEGA, DB, DEG)),
 ]
 
 
@@ -286,7 +295,7 @@ def recorded(folder: Path, text: str) -> RecordedResponse:
 @pytest.mark.parametrize(("cut", "head", "columns"), TABLES)
 def test_every_spelling_of_a_table(tmp_path, cut, head, columns):
     rows = [cut.join(f"{x:.12g}" for x in row) for row in zip(*columns, strict=True)]
-    rows = [row.replace(".", ",") for row in rows] if cut == ";" else rows
+    rows = [row.replace(".", ",") for row in rows] if cut in ";\t" else rows
     read = recorded(tmp_path, "# bench\n" + "\n".join(filter(None, [head, *rows[::-1]])))
     np.testing.assert_allclose(read.frequency_hz, HERTZ, rtol=1e-11)
     np.testing.assert_allclose(read.response, L, rtol=1e-10)
@@ -315,6 +324,27 @@ def test_matlab_and_python_control(tmp_path, held):
     np.testing.assert_allclose(read.deviation, 0.25, rtol=1e-14)  # sqrt(0.2/(0.8 * 4))
     given = read_response(control.FrequencyResponseData(L, OMEGA))
     np.testing.assert_allclose(given.response, read.response, rtol=1e-14)
+
+
+def test_other_files_of_columns(tmp_path: Path) -> None:
+    """JSON, Parquet, a text that is no UTF-8, and what get(frd) of MATLAB is, whose unit is a text."""
+    columns = {"f [\u00b5Hz]": (HERTZ * 1e6).tolist(), "gain_db": DB.tolist(), "phase (\u00b0)": DEG.tolist()}
+    (tmp_path / "r.json").write_text(json.dumps({"bench": columns}), encoding="utf-8")
+    pyarrow.parquet.write_table(pyarrow.table(columns), tmp_path / "r.parquet")
+    rows = "\n".join(",".join(map(repr, row)) for row in zip(*columns.values(), strict=True))
+    (tmp_path / "r.csv").write_text(f"{','.join(columns)}\n{rows}", encoding="cp1252")
+    for unit, time, values in (("rad/TimeUnit", "minutes", 60.0 * OMEGA), ("kHz", "seconds", HERTZ / 1e3)):
+        held = {
+            "Frequency": values,
+            "FrequencyUnit": unit,
+            "TimeUnit": time,
+            "ResponseData": L.reshape(1, 1, 4),
+        }
+        scipy.io.savemat(tmp_path / f"{time}.mat", {"g": held | {"Ts": 0.0}})
+    for file in tmp_path.iterdir():
+        read = read_response(file)
+        np.testing.assert_allclose(read.frequency_hz, HERTZ, rtol=1e-12)
+        np.testing.assert_allclose(read.response, L, rtol=1e-12)
 
 
 @pytest.mark.parametrize("of", ["T", "S"])
@@ -378,6 +408,13 @@ def test_a_row_copied_tells_no_noise(tmp_path: Path) -> None:
     ("f,re,im,std_abs\n1,3,4,1\n2,3,4,1", "deviations in abs; allowed: one over the size"),
     ("f,re,im,std,sigma\n1,3,4,1,1\n2,3,4,1,1", "deviations in no unit and no unit"),
     ("f,re,im\n1,0,0\n2,2,1", "a value that is 0"),
+    ("f_hz,gain_db,Phase [Grad]\n1,2,-90\n2,1,-99", 'Grad]": its unit is not known; allowed: deg or rad'),
+    ("f_mhz,re,im\n1,2,3\n2,2,2", 'f_mhz": its unit is not known; allowed: Hz, kHz, rad/s or 1/min'),
+    ("f [1/s],re,im\n1,2,3\n2,2,2", "its unit is not known"),
+    ("f_hz,gain_db,phase_lag_deg\n1,2,90\n2,1,99", 'lag_deg" is turned round; allowed: a gain, a phase'),
+    ("f_hz,attenuation_db,phase_deg\n1,2,90\n2,1,99", "is turned round"),
+    ("f_hz,gain_db,phase_deg\n1,2,9;\n2,1,9;", "is no row of numbers"),
+    ("f_hz,re,im\n1,2,3,\n2,2,3,", "3 columns in line 1, 4 in the rows below"),
     ("", "is empty"),
 ])  # fmt: skip
 def test_what_is_no_response_is_refused(tmp_path, text, words):

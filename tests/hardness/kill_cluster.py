@@ -17,10 +17,12 @@ import traceback
 from collections import Counter
 from collections.abc import Callable, Iterator
 from functools import cache
+from multiprocessing.context import ForkProcess
 from pathlib import Path
 
-import distributed  # noqa: F401 - here, not in every child
-import pyarrow.parquet  # noqa: F401
+import pyarrow.parquet  # noqa: F401 - here, not in every child
+from distributed import cli
+from distributed.cli import dask_scheduler, dask_worker  # noqa: F401
 
 from actuator_lti import NumericalError, load_design
 from analyses.comparison.variants import compare
@@ -64,11 +66,20 @@ def compared(folder: Path, engine: Engine) -> object:
 STUDIES: tuple[Callable[[Path, Engine], object], ...] = (kept, reduced, compared)
 
 
+class Forked(ForkProcess):
+    """A process of this one, used as `subprocess.Popen` is."""
+
+    wait = ForkProcess.join
+
+    def poll(self) -> int | None:
+        return self.exitcode
+
+
 class Cluster:
     def __init__(self, folder: Path) -> None:
         self.file, self.log = folder / "scheduler.json", folder / "cluster.log"
-        self.scheduler: subprocess.Popen[bytes] | None = None
-        self.workers: list[subprocess.Popen[bytes]] = []
+        self.scheduler: subprocess.Popen[bytes] | Forked | None = None
+        self.workers: list[subprocess.Popen[bytes] | Forked] = []
 
     def start(self, workers: int = 2) -> None:
         if self.scheduler is None:
@@ -92,11 +103,24 @@ class Cluster:
             return json.loads(self.file.read_text())["address"]
         return ""
 
-    def _process(self, environment: dict[str, str], kind: str, *words: str) -> subprocess.Popen[bytes]:
-        common = ("--no-dashboard", "--host", "127.0.0.1", "--scheduler-file", str(self.file))
-        command = [sys.executable, "-m", f"distributed.cli.{kind}", *common, *words]
+    def _process(
+        self, environment: dict[str, str], kind: str, *words: str
+    ) -> subprocess.Popen[bytes] | Forked:
+        """A program of the library; forked where no thread runs and the library is there."""
+        words = ("--no-dashboard", "--host", "127.0.0.1", "--scheduler-file", str(self.file), *words)
+        if __name__ == "__main__" and not environment:
+            process = Forked(target=self._serve, args=(kind, words))
+            process.start()
+            return process
+        command = [sys.executable, "-m", f"distributed.cli.{kind}", *words]
         with self.log.open("ab") as log:
             return subprocess.Popen(command, stdout=log, stderr=log, env={**os.environ, **environment})
+
+    def _serve(self, kind: str, words: tuple[str, ...]) -> None:
+        with self.log.open("ab") as log:
+            os.dup2(log.fileno(), 1)
+            os.dup2(log.fileno(), 2)
+        getattr(cli, kind).main(words)
 
     def kill(self, victim: str, draw: random.Random) -> None:
         if victim == "scheduler":

@@ -27,7 +27,6 @@ from actuator_lti.design.settings_file import parse_settings, write_settings_xml
 from actuator_lti.design.units import parse_quantity
 from actuator_lti.design.writing import design_tree
 from actuator_lti.files.reading import decode
-from actuator_lti.files.response import read_response
 from analyses.linear.outer_loop import read_outer_loop
 from analyses.records import campaign_file
 from analyses.records.campaign_file import load_campaign
@@ -35,6 +34,7 @@ from analyses.records.csv_stream import read_csv_record
 from analyses.records.open_record import open_record
 from analyses.records.readers import read_record
 from analyses.records.record import Record
+from analyses.records.response import read_response
 from analyses.records.spec import CsvFormat, RecordSpec, SignalColumn, TimeColumn
 from analyses.studies import study
 from analyses.studies.sampling import read_table

@@ -117,6 +117,20 @@ def test_a_pole_that_tustin_takes_to_infinity_is_refused() -> None:
         assert "allowed: none there, or method = zoh" in said
 
 
+def test_a_matrix_the_wrong_way_round_is_refused() -> None:
+    """Not read row by row into a law of other numbers; a vector may lie or stand."""
+    A, B, C = [[0.5, 0.0], [0.1, 0.2]], np.arange(6.0).reshape(2, 3), [[1.0, 1.0]]
+    three, D = ["error", "speed", "current"], [[0.0] * 3]
+    assert BASE.with_law("velocity", (A, B, C, D, T), three).controller.velocity.law.B[1] == (3.0, 4.0, 5.0)
+    for wrong in (B.T, B.ravel()):
+        said = refused(BASE.with_law, "velocity", (A, wrong, C, D, T), three)
+        assert said.startswith("B: ")
+        assert "allowed: 2 rows, as A has" in said
+    for vector in ([1.0, 2.0], [[1.0, 2.0]], [[1.0], [2.0]]):
+        law = BASE.with_law("velocity", (A, vector, C, [[0.0]], T), ["error"]).controller.velocity.law
+        assert law.B == ((1.0,), (2.0,))
+
+
 @pytest.mark.parametrize("value", ['"0.5"', "true", "null", "[[0.5, true]]"])
 def test_json_text_and_truth_are_no_numbers(value: str, tmp_path: Path) -> None:
     said = refused(read, tmp_path, f'{{"A": {value}, "B": [[1]], "C": [[1]], "D": [[0]], "Ts": {T}}}', NAMES)

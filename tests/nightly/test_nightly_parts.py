@@ -6,7 +6,8 @@ import subprocess
 import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
-from nightly_fakes import CODE, INLINE, Calendar, fake_document, job, study
+from nightly_builds import fake_document
+from nightly_fakes import CODE, INLINE, Calendar, job, study
 
 from actuator_lti.asked.quantities import LOOP_QUANTITIES, QUANTITIES
 from actuator_lti.errors import InputError

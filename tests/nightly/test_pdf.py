@@ -3,7 +3,7 @@
 import io
 
 import pytest
-from nightly_fakes import fake_document
+from nightly_builds import fake_document
 from test_nightly_hostile import HOSTILE
 
 from reports import document as doc

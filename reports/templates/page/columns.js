@@ -6,7 +6,7 @@ export const MEASURED = {
   angle: { rad: [1], deg: [DEGREE, /deg|°/i], mrad: [1e-3, /mrad/i] }, length: { m: [1], mm: [1e-3, /(_|\b)mm\b/i], "µm": [1e-6, /(_|\b)[uµ]m\b/i] },
   rate: { "rad/s": [1], "deg/s": [DEGREE, /deg|°/i], rpm: [TURN / 60, /rpm|1\/min/i] }, velocity: { "m/s": [1], "mm/s": [1e-3, /mm/i] }, current: { A: [1], mA: [1e-3, /(_|\b)mA\b/] },
 };
-// the columns of each kind of data: its words, how a heading names it, its units; a response's as in actuator_lti/files/response.py
+// the columns of each kind of data: its words, how a heading names it, its units; a response's as in analyses/records/response.py
 export const rolesOf = (kind, measured) => (kind === "response" ? {
   frequency: { words: "Frequency", like: /^f(req|_|\b)|^(omega|w)(_|\b)|hz\b/i, units: { Hz: [1, /(?<!k)hz/i], "rad/s": [1 / TURN, /rad|^omega|^w(_|\b)/i], kHz: [1e3, /khz/i] } },
   size: { words: "Magnitude", like: /(?<!i)mag|gain|abs|amp|db\b|^re(al)?(_|\b)|[._]re(al)?\b/i, units: { dB: ["dB", /db/i], ratio: ["abs", /abs|ratio|lin|\b1\b|\//i], "real part": ["re", /^re|[._]re/i] } },

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from codecs import BOM_UTF8
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -12,9 +13,8 @@ from numpy.typing import NDArray
 
 from actuator_lti.bounds import CSV_COLUMNS, MAT_BYTES, TABLE_BYTES, TABLE_ROWS
 from actuator_lti.errors import InputError, in_file
-from actuator_lti.files import response_columns as column
 from actuator_lti.files.mat5 import read_mat5
-from actuator_lti.files.reading import read_bytes, read_text, shown, shown_path
+from actuator_lti.files.reading import UTF_16, read_bytes, shown, shown_path
 from actuator_lti.measured.response import (
     CONFIDENCE,
     GAUSSIAN,
@@ -24,6 +24,9 @@ from actuator_lti.measured.response import (
     student,
 )
 from actuator_lti.types import Compared, Floats
+from analyses.records import response_columns as column
+from analyses.records.csv_stream import text_of
+from analyses.records.readers import TABLES
 
 Loop = Literal["L", "T", "S"]
 UNTITLED = ("f_hz", "gain_db", "phase_deg", "coherence")  # columns without a heading
@@ -80,12 +83,13 @@ class RecordedResponse(Compared):
 def read_response(source: Path | str | Any, averages: int | None = None) -> RecordedResponse:
     """Read a measured response.
 
-    A table in text has its columns parted by comma, semicolon (then with decimal comma, too), tab or space,
+    A table in text has its columns parted by comma, semicolon or tab (then with decimal comma, too) or space,
     and says in its heading what they are: ``frequency_hz,gain_db,phase_deg``, ``f,real,imag,coherence``,
-    ``omega,ratio...``; without a heading they are Hz, dB, deg and perhaps coherence. A .mat file has arrays
-    of such names, or a complex one. ``Ts`` or ``dt`` of one value is the sampling period. What a name leaves
-    open (dB or ratio, deg or rad) and the numbers do not decide is refused, as are two columns that say the
-    same and contradict.
+    ``omega,ratio...``, perhaps in a comment, or above a row of units; what stands above it is passed over.
+    Without a heading they are Hz, dB, deg and perhaps coherence. JSON and Parquet have columns, a .mat file
+    arrays of such names, or a complex one. ``Ts`` or ``dt`` of one value is the sampling period. What a name
+    leaves open (dB or ratio, deg or rad) and the numbers do not decide is refused, as are a unit that is none
+    of its column's and two columns that say the same and contradict.
 
     Rows at the same frequency are repeats: their mean is taken, and where no noise is told their scatter.
 
@@ -113,47 +117,96 @@ def read_response(source: Path | str | Any, averages: int | None = None) -> Reco
     if not isinstance(source, (str, Path)):
         raise InputError(f"{shown(source)}: allowed: a path or control.FrequencyResponseData")
     with in_file(shown_path(source)):
-        if titled := Path(source).suffix.lower() == ".mat":
-            content = read_mat5(read_bytes(source, column.WHAT, MAT_BYTES))
-            columns = {name: values.ravel() for name, values in content.arrays.items()}
-            for name, values in content.complexes.items():
-                columns |= {f"{name}.real": values.real.ravel(), f"{name}.imag": values.imag.ravel()}
+        titled, suffix = True, Path(source).suffix.lower()
+        if suffix == ".mat":
+            columns = _matlab(read_bytes(source, column.WHAT, MAT_BYTES))
+        elif suffix in TABLES:
+            columns = dict(TABLES[suffix](Path(source))[0])
         else:
-            columns, titled = _table(read_text(source, column.WHAT, TABLE_BYTES))
+            columns, titled = _table(read_bytes(source, column.WHAT, TABLE_BYTES))
         read = _response(columns, Path(source).name, averages)
         return read if titled else replace(read, read_as=f"without a heading, {read.read_as}")
 
 
-def _table(text: str) -> tuple[dict[str, Floats], bool]:
-    every = [(at, line.strip()) for at, line in enumerate(text.splitlines(), 1)]
-    every = [(at, line) for at, line in every if line and line[0] not in "#%"]
-    places, lines = [at for at, _ in every], [line for _, line in every]
-    TABLE_ROWS.check(len(lines))
-    if not lines:
+def _matlab(data: bytes) -> dict[str, Floats]:
+    """The arrays of a file, complex ones as both parts; of a structure's its text ``...Unit`` with it."""
+    content = read_mat5(data)
+    columns = {name: values.ravel() for name, values in content.arrays.items()}
+    for name, values in content.complexes.items():
+        columns |= {f"{name}.real": values.real.ravel(), f"{name}.imag": values.imag.ravel()}
+    texts = {name: one[0] for name, one in content.texts.items() if one}
+    for name in [name for name in columns if f"{name}Unit" in texts]:
+        group = name.rpartition(".")[0]
+        unit = texts[f"{name}Unit"].replace("TimeUnit", texts.get(f"{group}.TimeUnit", "s"))
+        columns[f"{name} [{unit}]"] = columns.pop(name)
+    alone = len({name.partition(".")[0] for name in columns}) == 1
+    return {name.partition(".")[2] or name if alone else name: one for name, one in columns.items()}
+
+
+def _table(data: bytes) -> tuple[dict[str, Floats], bool]:
+    if data[:2] in UTF_16:
+        raise InputError("is UTF-16; allowed: UTF-8 text")
+    every = [
+        (at, line.strip()) for at, line in enumerate(text_of(data.removeprefix(BOM_UTF8)).splitlines(), 1)
+    ]
+    plain = [(at, line) for at, line in every if line and line[0] not in "#%"]
+    TABLE_ROWS.check(len(plain))
+    if not plain:
         raise InputError(f"is empty; allowed: a {column.TABLE}")
-    cut = next((sign for sign in ";\t," if sign in lines[0]), None)
-    rows = [[word.strip().strip('"') for word in line.split(cut)] for line in lines]
+    first = next((k for k, (_, line) in enumerate(plain) if _is_row(line)), -1)
+    place, line = plain[first]
+    if first < 0:
+        raise InputError(f"{shown(line)} in line {place} is no row of numbers; allowed: a {column.TABLE}")
+    cut = _cut(line)
+    rows = [_words(line, cut) for _, line in plain[first:]]
     width = len(rows[0])
     CSV_COLUMNS.check(width)
-    if width < 2:
-        raise InputError(f"line {places[0]} is no row of a table; allowed: a {column.TABLE}")
-    for line, row in zip(places, rows, strict=True):
+    for (at, _), row in zip(plain[first:], rows, strict=True):
         if len(row) != width:
-            there = f"{len(row)} columns in line {line}, {width} in the first"
+            there = f"{len(row)} columns in line {at}, {width} in the first"
             raise InputError(f"{there}; allowed: a {column.TABLE}")
-    head = rows.pop(0) if any(np.isnan(_number(word, cut)) for word in rows[0]) else None
-    for line, row in zip(places[len(places) - len(rows) :], rows, strict=True):
         if wrong := [word for word in row if word.lower() not in NO_VALUE and np.isnan(_number(word, cut))]:
-            raise InputError(f"line {line}: {shown(wrong[0])} is no number; allowed: numbers, or nothing")
+            raise InputError(f"line {at}: {shown(wrong[0])} is no number; allowed: numbers, or nothing")
+    above = [_words(line.lstrip("#%!/ "), cut) for at, line in every if at < place]
+    head = _heading([words for words in above if len(words) == width])
+    if head is None and first:  # no comment, and no heading that is known
+        head = _words(plain[first - 1][1], cut)
+        if len(head) != width:
+            there = f"{len(head)} columns in line {plain[first - 1][0]}, {width} in the rows below"
+            raise InputError(f"{there}; allowed: a {column.TABLE}")
     values = np.array([[_number(word, cut) for word in row] for row in rows]).reshape(-1, width)
     names = (head or [*UNTITLED, *(f"column {k}" for k in range(5, width + 1))])[:width]
     apart = [f"{name} ({k})" if name and name in names[: k - 1] else name for k, name in enumerate(names, 1)]
     return dict(zip(apart, values.T, strict=True)), head is not None
 
 
+def _heading(above: list[list[str]]) -> list[str] | None:
+    """The names above a table, each with what a row of units below them says; ``None``: there are none."""
+    before, last = above[:-1], above[-1] if above else []
+    if before and column.are_units(last) and column.is_heading(before[-1]):
+        units = [unit.strip("[]() ") for unit in last]
+        return [f"{name} [{unit}]" if unit else name for name, unit in zip(before[-1], units, strict=True)]
+    return last if column.is_heading(last) else None
+
+
+def _cut(line: str) -> str | None:
+    return next((sign for sign in ";\t," if sign in line), None)
+
+
+def _words(line: str, cut: str | None) -> list[str]:
+    return [word.strip().strip('"') for word in line.split(cut)]
+
+
+def _is_row(line: str) -> bool:
+    """Whether a line holds two numbers or more, and nothing else."""
+    cut = _cut(line)
+    words = [word for word in _words(line, cut) if word.lower() not in NO_VALUE]
+    return len(words) > 1 and not any(np.isnan(_number(word, cut)) for word in words)
+
+
 def _number(word: str, cut: str | None) -> float:
     try:
-        return float(word.replace(",", ".") if cut == ";" else word)
+        return float(word.replace(",", ".") if cut in (";", "\t") else word)
     except ValueError:
         return np.nan
 
@@ -169,7 +222,7 @@ def _response(columns: Mapping[str, Floats], name: str, averages: int | None) ->
     good &= (table.get("coherence", np.ones(count)) != 0.0) & (table["frequency"] != 0.0)
     table = {role: values[good] for role, values in table.items()}
     units = {role: column.unit_of(role, own, table[role]) for role, own in found.items()}
-    f = table["frequency"] * column.SI[units["frequency"]]
+    f = table["frequency"] * column.si_of("frequency", units["frequency"])
     if f.size < 2 or not (f > 0.0).all():
         told = f"{f.size} rows of numbers, frequencies above 0 in {(f > 0.0).sum()}"
         raise InputError(f"{told}; allowed: two rows or more, each at a frequency above 0 Hz")

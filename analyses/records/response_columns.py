@@ -1,17 +1,22 @@
 """Columns of a measured frequency response: what each is, in which unit, and what it tells of the noise."""
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import cast
 
 import numpy as np
 
+from actuator_lti.design.units import compatible, parse_unit
 from actuator_lti.errors import InputError
 from actuator_lti.files.reading import shown
 from actuator_lti.measured.response import CONFIDENCE, GAUSSIAN, student
 from actuator_lti.types import Complexes, Floats, Mask
+from analyses.records.naming import is_unit, spelled
 
-WHAT = "frequency response: CSV or .mat (up to -v7) with frequency, dB and deg or real and imaginary part"
+WHAT = (
+    "frequency response: CSV, JSON, Parquet or .mat (up to -v7) with frequency, dB and deg or real and "
+    "imaginary part"
+)
 HEADS = "f_hz,gain_db,phase_deg or f_hz,real,imag"
 TABLE = f"{WHAT}: a heading such as {HEADS}, then a row of numbers for each frequency"
 
@@ -23,21 +28,28 @@ _DEVIATION = (
 )
 # what each column is named, by which it is known, and how a name says its unit
 _UNITS: dict[str, tuple[re.Pattern[str], dict[str, str]]] = {
-    "coherence": (re.compile(r"coh|gamma", re.I), {}),
+    "coherence": (re.compile(r"coh|gamma|^cxy", re.I), {}),
     "averages": (re.compile(r"^n?_?av(g|erages?)\b", re.I), {}),
     PERIOD: (re.compile(r"^(ts|dt|(sampl(e|ing)[_ ]?)?period|sampl(e|ing)[_ ]?time)([_ ]s)?$", re.I), {}),
     "deviation": _DEVIATION,
     "deviation beside it": _DEVIATION,
     "frequency": (
-        re.compile(r"^f(req|_|\b)|^(omega|w)(_|\b)|hz\b", re.I),
-        {"khz": "kHz", "hz": "Hz", r"rad|^omega|^w(_|\b)": "rad/s"},
+        re.compile(r"^f(req|_|\b)|^(omega|w|wout)(_|\b)|hz\b", re.I),
+        {"khz": "kHz", "hz": "Hz", r"rad|^omega|^w(_|\b)|^wout": "rad/s"},
     ),
     "real": (re.compile(r"^re(al)?(_|\b)|[._]re(al)?\b", re.I), {}),
     "imaginary": (re.compile(r"^im(ag)?[a-z]*(_|\b)|[._]im(ag)?\b", re.I), {}),
-    "phase": (re.compile(r"phase|^arg|deg\b|^ph(_|\b)", re.I), {"deg|°": "deg", "rad": "rad"}),
+    "phase": (re.compile(r"phase|^arg|deg\b|°|^ph(_|\b)", re.I), {"deg|°": "deg", "rad": "rad"}),
     "size": (re.compile(r"mag|gain|abs|amp|db\b", re.I), {"db": "dB", r"abs|ratio|lin|\b1\b|[/]": "ratio"}),
 }
-SI = {"": 1.0, "kHz": 1e3, "Hz": 1.0, "rad/s": 0.5 / np.pi, "deg": np.pi / 180.0, "rad": 1.0, "%": 0.01}
+_LIKE = {"frequency": "Hz", "phase": "rad"}  # what is read of a unit is over this one
+_ALLOWED = {"frequency": "Hz, kHz, rad/s or 1/min", "phase": "deg or rad"}
+_BRACKETS = re.compile(r"[\[({]([^\])}]*)[\])}]")
+_UNREAD = re.compile(
+    r"(?<![a-z])[mgµunp]hz|grad(?!ient)|\bgon\b", re.I
+)  # a prefix in other letters; deg or not
+_TURNED = re.compile(r"lag\b|lag_|atten|loss|^1/|inverse", re.I)
+_NO_UNIT = ("", "-", "1", "db", "abs", "ratio", "lin")  # in a row of units
 # Of a name: its unit, and what is no letter.
 _FREQUENCY_UNIT = re.compile(r"k?hz|rad([_/ ]*(per)?[_/ ]*s(ec)?)?|[\W_\d]")
 _WORDS = {"size": "magnitude", "real": "real part", "imaginary": "imaginary part"}
@@ -66,8 +78,31 @@ def roles(columns: Mapping[str, Floats]) -> dict[str, str]:
     return {role: own for role, own in found.items() if not (parts and role in ("size", "phase"))}
 
 
+def is_heading(words: Sequence[str]) -> bool:
+    """Whether two kinds of columns are named."""
+    return sum(any(like.search(word) for word in words) for like, _ in _UNITS.values()) > 1
+
+
+def are_units(words: Sequence[str]) -> bool:
+    """Whether this is a row of units, as stands below a heading."""
+    plain = [word.strip("[]() ") for word in words]
+    return any(plain) and all(word.lower() in _NO_UNIT or is_unit(word) for word in plain)
+
+
+def si_of(role: str, unit: str) -> float:
+    """Factor of a frequency to Hz, of a phase to rad, of a deviation to a ratio."""
+    if not unit:
+        return 1.0
+    return parse_unit(spelled(unit)).factor / parse_unit(_LIKE.get(role, "1")).factor
+
+
 def unit_of(role: str, name: str, values: Floats) -> str:
-    """As its name says, else as its numbers do; frequencies are in Hz then."""
+    """As its name says, else as its numbers do; frequencies are in Hz then.
+
+    An InputError for a unit that is none of the column's, and for what is turned round.
+    """
+    if role in ("size", "phase") and _TURNED.search(name):
+        raise InputError(f"{shown(name)} is turned round; allowed: a gain, a phase (below 0 where it lags)")
     if said := _said(role, name):
         return said
     if role == "size" and not (values < 0.0).any():
@@ -78,6 +113,18 @@ def unit_of(role: str, name: str, values: Floats) -> str:
 
 
 def _said(role: str, name: str) -> str:
+    """The unit in a name: of a frequency or phase in brackets or behind it with any prefix."""
+    if role in _LIKE:
+        held = _BRACKETS.findall(name)
+        written = [
+            one for one in (*held, *re.split(r"[_\s/]", name)[-1:]) if is_unit(one) and one.strip("1 ")
+        ]
+        fits = [one for one in written if compatible(parse_unit(spelled(one)), parse_unit(_LIKE[role]))]
+        if fits:
+            return fits[0].strip()
+        square = [one for one in held if f"[{one}]" in name and not re.search(r"hz|rad|deg", one, re.I)]
+        if square or _UNREAD.search(name) or any(is_unit(one) and one.strip("1 ") for one in held):
+            raise InputError(f"{shown(name)}: its unit is not known; allowed: {_ALLOWED[role]}")
     return next((unit for like, unit in _UNITS[role][1].items() if re.search(like, name, re.I)), "")
 
 
@@ -90,7 +137,9 @@ def complex_values(table: Mapping[str, Floats], units: Mapping[str, str]) -> Com
     if "real" in table:
         return table["real"] + 1j * table["imaginary"]
     with np.errstate(over="ignore", under="ignore", invalid="ignore"):
-        made = _size(table["size"], units["size"]) * np.exp(1j * SI[units["phase"]] * table["phase"])
+        made = _size(table["size"], units["size"]) * np.exp(
+            1j * si_of("phase", units["phase"]) * table["phase"]
+        )
     return cast("Complexes", made)
 
 
@@ -113,7 +162,7 @@ def _off(role: str, name: str, values: Floats, f: Floats, z: Complexes) -> Float
         if _FREQUENCY_UNIT.sub("", name.lower()) not in ("f", "freq", "frequency", "omega", "w"):
             return None
         said = _said("frequency", name)
-        off = [values * SI[one] / f - 1.0 for one in ([said] if said else ["Hz", "rad/s"])]
+        off = [values * si_of(role, one) / f - 1.0 for one in ([said] if said else ["Hz", "rad/s"])]
         return min(off, key=lambda one: float(np.median(np.abs(one))))
     if role in ("real", "imaginary"):
         return (values - (z.real if role == "real" else z.imag)) / np.abs(z)
@@ -121,7 +170,7 @@ def _off(role: str, name: str, values: Floats, f: Floats, z: Complexes) -> Float
         return None
     if role == "size":
         return _size(values, unit) / np.abs(z) - 1.0
-    return cast("Floats", np.angle(np.exp(1j * SI[unit] * values) / z))
+    return cast("Floats", np.angle(np.exp(1j * si_of(role, unit) * values) / z))
 
 
 def noise_of(
@@ -149,12 +198,14 @@ def _deviation(table: Mapping[str, Floats], units: Mapping[str, str]) -> Floats:
         raise InputError("a deviation below 0")
     kinds = tuple(sorted(unit for unit, _ in told))
     if kinds in (("",), ("%",)):
-        return told[0][1] * SI[kinds[0]]
+        return told[0][1] * si_of("", kinds[0])
     if kinds not in (("dB",), ("deg",), ("rad",), ("dB", "deg"), ("dB", "rad")):
         words = " and ".join(unit or "no unit" for unit in kinds)
         allowed = "one over the size of the value (a ratio or %), or of the gain in dB, of the phase in deg"
         raise InputError(f"deviations in {words}; allowed: {allowed}, or both")
-    parts = [np.expm1(values * _DB) if unit == "dB" else SI[unit] * values for unit, values in told]
+    parts = [
+        np.expm1(values * _DB) if unit == "dB" else si_of("phase", unit) * values for unit, values in told
+    ]
     return np.sqrt(2.0 / len(parts) * np.sum(np.square(parts), axis=0))
 
 
