@@ -104,6 +104,7 @@ def linear_figures(
     population: Population, *, operating_point: OperatingPoint = "sliding", load_Nm: float = 0.0,
     speed_amplitude_rad_s: float | None = None, direction: int = 1,
     time_figures: bool | Collection[str] = True, held: bool = False, threads: int = 1,
+    loops: Collection[str] | None = None,
 ) -> LinearFigures:  # fmt: skip
     """Figures of the sampled loops of every design of a population.
 
@@ -119,6 +120,7 @@ def linear_figures(
     in a drive that is stable as a whole, the figures of the same loop with the rotor held (current) or the
     load moment held (velocity), if stable.
     ``threads``: that share the designs.
+    ``loops``: those whose figures are wanted, by default all that the structure has.
 
     Raises `InputError`: for loops of more states than `actuator_lti.bounds.LOOP_STATES`.
     """
@@ -127,27 +129,33 @@ def linear_figures(
     out = np.full((population.count, len(LOOPS), fig.COLUMNS), np.nan)
     every = LOOPS if time_figures is True else ()
     timed = every if isinstance(time_figures, bool) else time_figures
-    chunks = [
-        group[first : first + _CHUNK]
-        for group in population.alike()
-        for first in range(0, len(group), _CHUNK)
-    ]
-
-    def fill(chosen: np.ndarray) -> None:
-        _fill(wire(population.part(chosen).stacked, at), chosen, timed, out)
-
-    with ThreadPoolExecutor(max(1, threads)) as pool:
-        list(pool.map(fill, chunks))
     wired = wire(population.stacked, at)
+    wanted = tuple(stage for stage in wired.stages if loops is None or stage in loops)
+
+    def fill(of: Collection[str], some: Population, numbers: np.ndarray) -> None:
+        chunks = (
+            group[first : first + _CHUNK] for group in some.alike() for first in range(0, len(group), _CHUNK)
+        )
+
+        def one(chosen: np.ndarray) -> None:
+            _fill(wire(some.part(chosen).stacked, at), numbers[chosen], timed, out, of)
+
+        with ThreadPoolExecutor(max(1, threads)) as pool:
+            list(pool.map(one, chunks))
+
+    fill(wanted, population, np.arange(population.count))
     if held:
-        for loop in wired.stages:
-            if loop != wired.outermost and loop != "position":
-                _hold(population, at, loop, out, timed)
+        inner = [loop for loop in wanted if loop not in (wired.outermost, "position")]
+        lost = np.flatnonzero((out[:, [LOOPS.index(loop) for loop in inner], fig.STABLE] == 0.0).any(axis=1))
+        if lost.size and wired.outermost not in wanted:
+            fill((wired.outermost,), population.part(lost), lost)
+        for loop in inner:
+            _hold(population, at, loop, out, timed)
     periods = [
         np.broadcast_to(wired.period_s(loop) if loop in wired.stages else np.nan, population.count)
         for loop in LOOPS
     ]
-    return LinearFigures(wired.stages, population.count, out, np.column_stack(periods))
+    return LinearFigures(wanted, population.count, out, np.column_stack(periods))
 
 
 def _hold(population: Population, at: Operating, loop: str, out: np.ndarray, timed: Collection[str]) -> None:
@@ -159,7 +167,7 @@ def _hold(population: Population, at: Operating, loop: str, out: np.ndarray, tim
     def rows(chosen: np.ndarray, operating: Operating) -> np.ndarray:
         some, result = population.part(chosen), np.full((len(chosen), *out.shape[1:]), np.nan)
         for group in some.alike():
-            _fill(wire(some.part(group).stacked, operating), group, timed, result, only=loop)
+            _fill(wire(some.part(group).stacked, operating), group, timed, result, (loop,))
         return result[:, place]
 
     away = lost & pushes_away(population.stacked, at)
@@ -175,10 +183,10 @@ def _hold(population: Population, at: Operating, loop: str, out: np.ndarray, tim
 
 
 def _fill(
-    wired: Drive, chosen: np.ndarray, timed: Collection[str], out: np.ndarray, only: str | None = None
+    wired: Drive, chosen: np.ndarray, timed: Collection[str], out: np.ndarray, stages: Collection[str]
 ) -> None:
-    """Figures of every loop of stacked designs, or of one."""
-    for stage in wired.stages if only is None else (only,):
+    """Figures of some loops of stacked designs."""
+    for stage in stages:
         rows, time_figures = np.full((len(chosen), out.shape[2]), np.nan), stage in timed
         rows[:, [fig.GAIN_CROSSOVERS, fig.PHASE_CROSSOVERS]] = 0.0
         lead, response = _command_path(wired) if stage == "position" else (0.0, None)

@@ -11,7 +11,14 @@ from typing import Any
 from actuator_lti.design.model import Design
 from actuator_lti.drive.choice import finite, larger, smaller, where
 from actuator_lti.drive.operating import Operating, dry_torque, friction_slopes, stiffness_there, train_gain
-from actuator_lti.drive.steady import back_emf_Nms_rad, circuit_resistance_ohm, drive_gain, droop, winding
+from actuator_lti.drive.steady import (
+    back_emf_Nms_rad,
+    circuit_resistance_ohm,
+    current_limit_torque_Nm,
+    droop,
+    voltage_limit_torque_Nm,
+    winding,
+)
 from actuator_lti.drive.wiring import present
 from actuator_lti.errors import InputError
 
@@ -35,13 +42,13 @@ class Capability:
 
 
 def stall_torque_Nm(design: Design) -> Any:
-    """Largest motor torque at rest; ``inf`` without a limit. A P current loop falls short of its command."""
+    """Largest motor torque at rest; ``inf`` without a limit."""
     motor, limits = design.effective_motor, design.limits
     if motor.source_gain_Nm_V is not None:
         return motor.source_gain_Nm_V * limits.voltage_V
-    torque = winding(motor)[1] * limits.voltage_V / circuit_resistance_ohm(design)
+    torque = voltage_limit_torque_Nm(design, 0.0)
     if design.controller.current is not None:
-        torque = smaller(torque, drive_gain(design) * limits.peak_current_A)
+        torque = smaller(torque, current_limit_torque_Nm(design, 0.0))
     return torque
 
 

@@ -6,6 +6,7 @@ samples of the position loop, n = 2 a/(j T) rounded up, and acts on every comman
 
 from dataclasses import dataclass
 from math import asin, ceil, inf, pi, sin, sqrt
+from typing import Any
 
 import numpy as np
 
@@ -58,16 +59,17 @@ def command_mean(design: Design) -> CommandMean | None:
     return CommandMean(samples, period) if samples > 1 else None
 
 
-def profile_onset_rad(design: Design, omega_rad_s: np.ndarray) -> np.ndarray:
-    """Peak of a sine command from which on its rate or acceleration limit acts; ``inf`` where neither does.
+def sampled_rate_rad_s(omega_rad_s: Any, period_s: Any) -> Any:
+    """Largest change per time of the samples of a sine of peak 1, T apart: 2 sin(w T/2)/T."""
+    return 2.0 * np.sin(0.5 * np.asarray(omega_rad_s, dtype=float) * period_s) / period_s
 
-    The largest difference of samples T apart is 2 sin(w T/2) of the peak, the second one its square.
-    """
+
+def profile_onset_rad(design: Design, omega_rad_s: np.ndarray) -> np.ndarray:
+    """Peak of a sine command from which on its rate or acceleration limit acts; ``inf`` without any."""
     command, control = design.command, design.controller
     if control.position is None:
         return np.full(np.shape(omega_rad_s), inf)
-    period = control.position.every * control.period_s
-    per_peak = 2.0 * np.sin(0.5 * np.asarray(omega_rad_s, dtype=float) * period) / period
+    per_peak = sampled_rate_rad_s(omega_rad_s, control.position.every * control.period_s)
     return np.asarray(np.minimum(command.rate_rad_s / per_peak, command.acceleration_rad_s2 / per_peak**2))
 
 

@@ -59,6 +59,11 @@ def voltage_limit_torque_Nm(design: Design, speed_rad_s: Any) -> Any:
     return kM * (design.limits.voltage_V - kE * speed_rad_s) / circuit_resistance_ohm(design)
 
 
+def current_limit_torque_Nm(design: Design, speed_rad_s: Any) -> Any:
+    """Torque at the current limit and a speed; a P current loop falls short of it."""
+    return drive_gain(design) * design.limits.peak_current_A - back_emf_Nms_rad(design) * speed_rad_s
+
+
 def own_drag_Nms_rad(design: Design) -> Any:
     """Damping of the motor by itself: its friction and, without a current loop, its back-EMF ``kM kE/R``."""
     drag = design.friction.viscous_Nms_rad

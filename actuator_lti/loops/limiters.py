@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from actuator_lti.design.model import Design
-from actuator_lti.drive.profile import command_mean, profile_onset_rad
+from actuator_lti.drive.profile import command_mean, profile_onset_rad, sampled_rate_rad_s
 from actuator_lti.drive.signals import CLAMP_OF, LIMITERS, Limiter
 from actuator_lti.drive.wiring import Drive
 from actuator_lti.errors import InputError, finite_number, shown
@@ -131,7 +131,7 @@ def _of_the_command(loops: Loops, omega: np.ndarray) -> dict[str, np.ndarray]:
     """A_k of the limits of the command itself, as its profile's: no loop stands in front of them."""
     design, limits = loops.design, loops.design.limits
     stage, period = design.controller.outermost, design.controller.period_of(design.controller.outermost)
-    change = 2.0 * np.sin(0.5 * omega * period) / period if loops.form == "sampled" else omega
+    change = sampled_rate_rad_s(omega, period) if loops.form == "sampled" else omega
     each = {"profile": profile_onset_rad(design, omega)}
     if stage == "velocity":
         each["speed"] = np.full(omega.shape, limits.speed_rad_s / design.total_ratio)

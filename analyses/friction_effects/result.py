@@ -12,7 +12,7 @@ from actuator_lti.drive.operating import dry_torque
 from actuator_lti.loops import Loops, assemble_loops
 from analyses.friction_effects.breakaway import Threshold, threshold
 from analyses.friction_effects.reversal import Hysteresis, hysteresis
-from analyses.large_signal.tones import linear_steady_state
+from analyses.large_signal.tones import settling_ticks_in_periods
 from analyses.limit_cycles.describing import Cycle, at_load, cycles_of_friction, dry_Nm
 from analyses.limit_cycles.run import Confirmation, confirm
 from analyses.limit_cycles.stick_slip import StickSlipCycle, stick_slip_cycle
@@ -128,7 +128,7 @@ def friction_effects(
     if not any(dry_Nm(design, load) > 0.0 for load in loads):
         return FrictionEffects(design, (), integrator, "the design has no dry friction")
     loops = assemble_loops(design) if loops is None else loops
-    settling = linear_steady_state(loops, np.array([1.0])).settling_ticks
+    settling = settling_ticks_in_periods(loops)
     points, alone = list[FrictionPoint](), quiet(design)
     most = max(loads, key=lambda load: dry_Nm(design, load))
     described = described_cycles(design, most)

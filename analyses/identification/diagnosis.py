@@ -15,7 +15,7 @@ from analyses.estimation.parameters import Parameter, parameter
 from analyses.estimation.series import correlation_time
 from analyses.identification.friction_law import Bend, bend_of, kept_columns
 from analyses.identification.inverse import fit_records
-from analyses.identification.joint_model import JointModel, Recipe, RecordFit, Rows
+from analyses.identification.joint_model import TURNS, JointModel, Recipe, RecordFit, Rows
 from analyses.identification.output_error import simulated_part
 from analyses.identification.own_bias import with_model_signals
 from analyses.identification.rows import (
@@ -43,6 +43,8 @@ class Lag:
 
     seconds: float
     standard_error: float
+    per_s: Floats  # what the values of the model come to by a shift, and by a filter's spread
+    per_s2: Floats
 
     @property
     def is_sure(self) -> bool:
@@ -76,11 +78,13 @@ def diagnosed(
     whole = [without_flat_tops(start, record, recipe) for record in records]
     used, found = [record for record, _ in whole], {record.name: clipped for record, clipped in whole}
     model = fit(used)
-    late, sure = 0.0, list[Lag]()
+    late, sure, lags = 0.0, list[Lag](), list[tuple[Lag, float]]()
     for k, (record, like) in enumerate(zip(tuple(used), model.simulated, strict=False)):
         own, other = (lag_of(start, one, like, model) for one in (record, like))
         if own is not None and other is not None:  # the simulation has none, but what is found in it
-            lag = Lag(own.seconds - other.seconds, float(np.hypot(own.standard_error, other.standard_error)))
+            error = float(np.hypot(own.standard_error, other.standard_error))
+            lag = replace(own, seconds=own.seconds - other.seconds, standard_error=error)
+            lags.append((lag, record.period_s))
             found[record.name].append(_of_lag(drive_of(start, record)[1], lag, record.period_s))
             late = max(late, lag.within_s)
             if lag.is_sure:
@@ -91,6 +95,7 @@ def diagnosed(
         if before.names == model.names:
             share = np.mean([(lag.standard_error / lag.seconds) ** 2 for lag in sure])
             model = model.wider(np.sqrt(share) * (model.values - before.values))
+    model = _with_lags(model, lags)
     pairs = zip(used, model.simulated, strict=False)  # none where it cannot be simulated
     seen = {record.name: _followed(start, record, like.signals) for record, like in pairs}
     for record, part in zip(used, model.records, strict=True):
@@ -110,6 +115,19 @@ def diagnosed(
         followed={name: one for name, one in seen.items() if one is not None},
         findings={name: tuple(each) for name, each in found.items()},
     )
+
+
+def _with_lags(model: JointModel, lags: Sequence[tuple[Lag, float]]) -> JointModel:
+    """The model with what lags that are not sure move, and filters that were taken back as delays.
+
+    Of a filter of first order that is sampled every T the impulse response has the variance L (L + T), L its
+    lag; of a delay none.
+    """
+    for lag, period_s in lags:
+        if len(lag.per_s) == len(model.names):
+            filtered = abs(lag.seconds) * (abs(lag.seconds) + period_s) * lag.per_s2
+            model = model.wider(filtered if lag.is_sure else lag.within_s * lag.per_s)
+    return model
 
 
 def _followed(start: Design, record: Record, simulated: Mapping[str, Floats]) -> Followed | None:
@@ -211,15 +229,20 @@ def shifted(design: Design, record: Record, seconds: float) -> Record:
     return replace(record, signals={**record.signals, name: moved})
 
 
+def moved(design: Design, record: Record, seconds: float) -> Record:
+    """A record with its motion taken ``seconds`` later in the file."""
+    times, motions = record.time_s + seconds, (*PLACES, RATES[design.axis])
+    taken = {n: np.interp(times, record.time_s, record[n]) for n in motions if n in record.signals}
+    return replace(record, signals={**record.signals, **taken})
+
+
 def in_time(design: Design, record: Record, like: Record, late_s: float) -> Record:
     """A record with its drive signal earlier by so much, or its motion later: as a simulated one has both."""
-    times, motions = record.time_s - late_s, (*PLACES, RATES[design.axis])
-    moved = {n: np.interp(times, record.time_s, record[n]) for n in motions if n in record.signals}
-    ways = shifted(design, record, late_s), replace(record, signals={**record.signals, **moved})
-    drive = drive_of(design, record)[1]
+    ways = shifted(design, record, late_s), moved(design, record, -late_s)
+    names_of_all = (*PLACES, RATES[design.axis], drive_of(design, record)[1])
 
     def off(one: Record) -> float:
-        names = [n for n in (*motions, drive) if n in one.signals and n in like.signals]
+        names = [n for n in names_of_all if n in one.signals and n in like.signals]
         misses = {name: one[name][: len(like)] - like[name] for name in names}
         return sum(float(np.var(each)) / max(float(np.var(like[n])), 1e-300) for n, each in misses.items())
 
@@ -258,11 +281,37 @@ def lag_of(design: Design, record: Record, simulated: Record, model: JointModel)
             lag += float(np.clip(step, -LARGEST_STEP_S, LARGEST_STEP_S))
             if abs(step) < SETTLED * error:
                 break
-        turned = [rows.at(both, model.turned(rows)) for rows in (own, other)]
-        feigned = _step(z, table, turned[0] - turned[1])[0]
+        # the lag that other instants of reversal feign, of the motion as it is and taken back
+        feigned = [_step(z, table, own.at(both, model.turned(own)) - other.at(both, model.turned(other)))[0]]
+        back = rows_under(design, in_time(design, record, simulated, lag), model)
+        shared = both & back.keep[: len(both)]
+        seen = shared[both]
+        turned = back.at(shared, model.turned(back)) - other.at(shared, model.turned(other))
+        feigned.append(_step(z[seen], table[seen], turned)[0])
+        per_s, per_s2 = _per_lag(z, table, both, *_bend(design, record, model, own))
     except (InputError, NumericalError, np.linalg.LinAlgError):
         return None
-    return Lag(lag, float(np.hypot(error, feigned)))
+    return Lag(lag, float(np.hypot(error, min(feigned, key=abs))), per_s, per_s2)
+
+
+def _bend(design: Design, record: Record, model: JointModel, own: Rows) -> tuple[Mask, Floats]:
+    """Rows of a record, and by how much its drive falls there with a filter's spread, half its curvature.
+
+    Of what does not turn with the direction: the instants of reversal are those of the lag.
+    """
+    step = record.period_s
+    late, early = (rows_under(design, moved(design, record, s), model) for s in (step, -step))
+    shared, names = own.keep & late.keep & early.keep, [n for n in model.names if not n.startswith(TURNS)]
+    after, before, here = (one.at(shared, one.explained(model, names)) for one in (late, early, own))
+    return shared, 0.5 * (2.0 * here - before - after) / step**2
+
+
+def _per_lag(z: Floats, table: Floats, rows: Mask, there: Mask, bend: Floats) -> tuple[Floats, Floats]:
+    """What the values come to by a shift, and by a spread, rows ``z`` being the instruments."""
+    seen, own = there[: len(rows)][rows], rows[: len(there)][there[: len(rows)]]
+    z, table = z[seen], table[seen]
+    on = np.linalg.solve(z[:, :-1].T @ table[:, :-1], z[:, :-1].T)
+    return on @ table[:, -1], on @ bend[: len(own)][own]
 
 
 def _step(z: Floats, table: Floats, y: Floats) -> tuple[float, float]:

@@ -24,6 +24,7 @@ NAMES: Mapping[FrictionForm, tuple[str, ...]] = {
     "symmetric": ("inertia", "viscous", "dry", "offset"),
     "per-direction": ("inertia", "viscous_forward", "dry_forward", "viscous_reverse", "dry_reverse"),
 }
+TURNS = ("dry", "map_", "load_coefficient")  # what turns with the direction of the motion, by its name
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -212,8 +213,7 @@ class JointModel(Fit):
 
         A drive that stands still turns its friction at no time that the motion tells.
         """
-        dry = ("dry", "map_", "load_coefficient")
-        return rows.explained(self, [name for name in rows.names if name.startswith(dry)])
+        return rows.explained(self, [name for name in rows.names if name.startswith(TURNS)])
 
     @property
     def residual(self) -> Floats:

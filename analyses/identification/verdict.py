@@ -174,7 +174,7 @@ def lag_items(late_s: float, late: bool) -> Iterator[Item]:
     """A current that is, or may be, later than the motion by more than a sample."""
     if late:
         told = f"{1e3 * late_s:.2g} ms off, or not told closer: what is sure is taken back as a delay"
-        why = f"{told}, assumed no filter; inertia and friction hang on it"
+        why = f"{told}; the intervals hold what a filter of first order would make of it"
         yield Item.unproven("lag", "Current and motion at one time", why)
 
 

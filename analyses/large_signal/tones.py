@@ -63,7 +63,18 @@ class LinearSteadyState:
     output: np.ndarray  # shape (K,): command to output angle, fundamental over all ticks, mean included
     states: dict[str, np.ndarray]  # shape (K,): by column of the rows: value at t = 0 is the imaginary part
     stable: bool
-    settling_ticks: int  # ticks in which the slowest mode falls to what is left; cut at `LONGEST_PERIODS`
+    settling_ticks: int  # as `settling_ticks_in_periods`
+
+
+def settling_ticks_in_periods(loops: Loops, left: float = LEFT) -> int:
+    """Ticks, whole periods of all loops, until so much is ``left``, the command's mean included; cut."""
+    system, mean = loops.tick_system, command_mean(loops.design)
+    assert system is not None
+    settling = settling_ticks(system.slowest, left)
+    periods = min(math.ceil(settling / system.ticks), LONGEST_PERIODS) if settling < math.inf else 500
+    if mean is not None:
+        periods += math.ceil(mean.samples * loops.design.controller.position_loop.every / system.ticks)
+    return periods * system.ticks
 
 
 def linear_steady_state(loops: Loops, omega_rad_s: np.ndarray, left: float = LEFT) -> LinearSteadyState:
@@ -87,14 +98,12 @@ def linear_steady_state(loops: Loops, omega_rad_s: np.ndarray, left: float = LEF
     if "w_ref" in system.outputs:
         row, (_, _, C, D) = system.outputs.index("w_ref"), system.matrices(0)
         states["speed_command_start"] = (x @ C[row] + D[row, 0]) / z
-    settling = settling_ticks(system.slowest, left)
-    periods = min(math.ceil(settling / M), LONGEST_PERIODS) if settling < math.inf else 500
     mean = command_mean(loops.design)
     if mean is not None:  # in front of the loop: all that follows it is that much smaller and later
         before_loop = mean.response(omega_rad_s)
         output, states = output * before_loop, {name: x * before_loop for name, x in states.items()}
-        periods += math.ceil(mean.samples * loops.design.controller.position_loop.every / M)
-    return LinearSteadyState(output, states, settling < math.inf, periods * M)
+    stable = settling_ticks(system.slowest, left) < math.inf
+    return LinearSteadyState(output, states, stable, settling_ticks_in_periods(loops, left))
 
 
 def triangle_start(design: Design, rows: Rows, amplitude_rad: np.ndarray, limited: np.ndarray) -> None:
@@ -172,7 +181,7 @@ def tones(design: Design, loops: Loops, count: int) -> tuple[Tone, ...]:
 
 def work_ticks(design: Design, loops: Loops, count: int) -> int:
     """Ticks that a sine at each of so many tones takes, two windows long; with smoothed friction thrice."""
-    settling = linear_steady_state(loops, np.array([1.0])).settling_ticks
+    settling = settling_ticks_in_periods(loops)
     each = 3 if design.friction.law == "tanh" else 1
     return each * sum(settling + 2 * tone.ticks for tone in tones(design, loops, count))
 

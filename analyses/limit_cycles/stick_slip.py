@@ -15,7 +15,7 @@ from actuator_lti.design.model import Design
 from actuator_lti.drive.facts import breakaway_torque_Nm
 from actuator_lti.drive.steady import drive_gain, steady_input
 from actuator_lti.loops import Loops, assemble_loops
-from analyses.large_signal.tones import AT_REST, linear_steady_state, without_value
+from analyses.large_signal.tones import AT_REST, settling_ticks_in_periods, without_value
 
 SMALLEST, LARGEST, POINTS = 1e-3, 1.0, 241  # of the threshold
 SLOPE_STEP = 1e-3
@@ -105,7 +105,7 @@ def _slip(design: Design, load_Nm: float, loops: Loops | None) -> _Slip | None:
     loops = assemble_loops(design) if loops is None else loops
     if (system := loops.tick_system) is None:
         return None
-    ticks = linear_steady_state(loops, np.array([1.0])).settling_ticks
+    ticks = settling_ticks_in_periods(loops)
     torque = breakaway_torque_Nm(design, load_Nm, 1)
     current, volts = steady_input(design, torque, 0.0)
     start = torque / float(drive_gain(design))

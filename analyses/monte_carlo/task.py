@@ -160,7 +160,7 @@ class SampleTask:
     sampler: Sampler
     operating_point: OperatingPoint = "sliding"  # of the linear loops, as the load
     load_Nm: float = 0.0
-    loops: bool = True  # whether their figures are wanted
+    loops: Collection[str] | None = None  # whose figures are wanted; by default of all
     time_figures: bool | Collection[str] = True  # of their steps, or of which loops
     step: StepCheck | None = None  # a nonlinear one
 
@@ -187,8 +187,8 @@ class SampleTask:
         """Columns of figures for rows of parameter values (SI, in the order of ``sampler.paths``)."""
         population = Population(self.design, as_values(self.design, self.sampler.paths, draws), len(draws))
         columns: dict[str, np.ndarray] = {}
-        if self.loops:
-            at = {"operating_point": self.operating_point, "load_Nm": self.load_Nm}
+        if self.loops is None or self.loops:
+            at = {"operating_point": self.operating_point, "load_Nm": self.load_Nm, "loops": self.loops}
             linear = linear_figures(population, **at, time_figures=self.time_figures, held=True)
             columns = loop_columns(linear, self.design, self._quantities)
         for quantity, load in self._drive_wanted:
@@ -200,8 +200,8 @@ class SampleTask:
     def of(self, requirement: Requirement) -> SampleTask:
         """The same of what one requirement is on alone."""
         quantity, design = QUANTITIES[requirement.quantity], replace(self.design, requirements=(requirement,))
-        timed = judged_loops(requirement.loop, design.controller.stages) if quantity.timed else ()
-        loops = quantity.scope == "loop"
+        judged = judged_loops(requirement.loop, design.controller.stages)
+        loops, timed = judged if quantity.scope == "loop" else (), judged if quantity.timed else ()
         return replace(self, design=design, loops=loops, time_figures=timed, step=None)
 
     @property

@@ -10,12 +10,7 @@ from actuator_lti.design.model import Command, Design
 from actuator_lti.design.plant import no_load_speed
 from actuator_lti.drive import facts
 from actuator_lti.drive.facts import stall_torque_Nm, steady_torque_Nm
-from actuator_lti.drive.steady import (
-    back_emf_Nms_rad,
-    drive_gain,
-    motor_torque_Nm,
-    voltage_limit_torque_Nm,
-)
+from actuator_lti.drive.steady import current_limit_torque_Nm, motor_torque_Nm, voltage_limit_torque_Nm
 from analyses.large_signal.tones import tone
 from nonlinear import commands, simulate
 
@@ -138,9 +133,8 @@ def torque_speed_plane(design: Design, top_speed_rad_s: float) -> TorqueSpeedPla
         if math.isfinite(limits.voltage_V):
             line = np.linspace(0.0, no_load_speed(design), PLANE_POINTS)
             bounds.append(Curve("voltage limit", line, voltage_limit_torque_Nm(design, line)))
-        if design.controller.current is not None and math.isfinite(limits.peak_current_A):  # a P loop: a part
-            asked = drive_gain(design) * limits.peak_current_A
-            bounds.append(Curve("peak current", ends, asked - back_emf_Nms_rad(design) * ends))
+        if design.controller.current is not None and math.isfinite(limits.peak_current_A):
+            bounds.append(Curve("peak current", ends, current_limit_torque_Nm(design, ends)))
         levels["continuous current"] = motor_torque_Nm(design, limits.continuous_current_A, math.nan)
     bounds += [Curve(name, ends, np.full(2, level)) for name, level in levels.items() if math.isfinite(level)]
     if design.controller.velocity is not None and math.isfinite(limits.speed_rad_s):

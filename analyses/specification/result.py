@@ -9,7 +9,7 @@ from actuator_lti.design.loader import AnyDesign, as_design
 from actuator_lti.design.model import Design
 from actuator_lti.loops import Loops, assemble_loops
 from analyses.finite import finite
-from analyses.large_signal.tones import TANH_TOLERANCE, linear_steady_state
+from analyses.large_signal.tones import TANH_TOLERANCE, settling_ticks_in_periods
 from analyses.specification import capability
 from nonlinear import LIMITERS, Rows
 
@@ -95,7 +95,7 @@ def specification(design: AnyDesign, loops: Loops | None = None) -> Specificatio
     """
     design = as_design(design)
     loops = assemble_loops(design) if loops is None else loops
-    settling_s = linear_steady_state(loops, np.array([1.0])).settling_ticks * design.controller.period_s
+    settling_s = settling_ticks_in_periods(loops) * design.controller.period_s
     loads = design.validation.loads_Nm
     result = tuple(capability.capability(design, load, settling_s) for load in loads)
     rates = [one.figures.output_rate_rad_s for one in result]

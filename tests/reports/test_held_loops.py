@@ -182,3 +182,15 @@ def test_a_range_stands_under_the_loop_whose_margins_it_begins_or_ends_with(held
             words = text.split()
             assert f"{float(own[end]):.3g}" in (words[0], words[-1])
         assert row("Velocity", "Position")[min(ranges)].endswith("locked" if held else "free")
+
+
+@pytest.mark.parametrize("design", [pushed(), p_velocity(1.0), on_a_spring(), load_design("joint")], ids=str)
+def test_one_loop_alone_has_the_bits_that_it_has_among_all(design: Design) -> None:
+    """Also where it is held, which asks whether the drive as a whole is stable."""
+    gain = design.controller.velocity.gain * np.array([0.5, 1.0, 100.0])
+    population = Population(design, {"control.velocity.gain": gain}, 3)
+    every = linear_figures(population, held=True)
+    for loop in every.loops:
+        one = linear_figures(population, held=True, loops=(loop,))
+        assert one.loops == (loop,)
+        np.testing.assert_array_equal(one.raw[:, one._index(loop)], every.raw[:, every._index(loop)])
