@@ -281,7 +281,11 @@ class Reader:
         if raw is None:
             return None
         unit = field.unit(self.structure)
+        width = raw.get("std", raw.get("half_width")) if isinstance(raw, dict) else raw
         try:
+            if isinstance(width, str) and self.frame.upside_down(width, field):
+                share = 100.0 * value / self.frame.quantity(width, field)
+                raise InputError(f'a width upside down; allowed: a share, here "{share:.4g} %", or {unit}')
             return read_tolerance(raw, value, lambda text: self.frame.quantity(text, field), field, unit)
         except InputError as error:
             at = f"{path}.{error.where}" if error.where else path

@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from math import isinf, pi, sqrt
 from typing import Any
@@ -55,7 +56,7 @@ class Frame:
         phase is line-line, as makers have it), a sampling rate as its period, a magnet pitch as its order,
         amperes rms or peak as those of the motor that the model has.
         """
-        unit, power = field.unit(self.structure), field.travel_power()
+        unit = field.unit(self.structure)
         if isinstance(text, str):
             turn = field.key == "counts_per_rev" and not self.per_metre(field.section)
             text = _PER_TURN.sub("", text) if turn or field.key == "lead" else text
@@ -66,17 +67,13 @@ class Frame:
             if said := {text[of.start() - 1]: of[of.lastindex or 1].lower() for of in words.finditer(text)}:
                 plain = self.quantity(words.sub("" if sheet else " dc", text), field)
                 return plain * self._amperes(field, unit, said)
-        rotary = field.unit(replace(self.structure, axis="rotary"))
-        factors = {unit: 1.0}
-        if self.travel_m_rad is not None and power and rotary != unit:
-            factors = {rotary: self.travel_m_rad**power, unit: 1.0}
         counted = field.key == "counts_per_rev" and self.structure.axis == "linear"
         if counted and _PER_TRAVEL.search(f"{text}"):
             whole_m = 1.0 if self.per_metre(field.section) else 2.0 * pi * (self.travel_m_rad or 0.0)
             counts = parse_quantity(text, "count/m") * whole_m  # of a metre, or of a lead
             return float(round(counts)) if abs(counts - round(counts)) <= 1e-9 * counts else counts
         refused: list[InputError] = []
-        for one, factor in factors.items():
+        for one, factor in self._units(field).items():
             try:
                 value = parse_quantity(text, one) * factor
             except InputError as error:
@@ -84,10 +81,28 @@ class Frame:
             else:
                 return self._said(text, field, unit, value)
             if (turned := _turned(field.path, text, one)) is not None:
-                line = field.section == "motor" and self.constants == "peak-phase"
+                line = field.key == "back_emf_constant" and self.constants == "peak-phase"
                 return turned * factor / (sqrt(3.0) if line else 1.0)
         refused = [one for one in refused if isinstance(one, AdvisedError)] or refused
         raise refused[-1 if field.section in ("load", "command", "validation") else 0]
+
+    def _units(self, field: Field) -> dict[str, float]:
+        """Units that a key is read in, in this order, and what one is in SI: behind a screw both axes'."""
+        unit, rotary = (field.unit(one) for one in (self.structure, replace(self.structure, axis="rotary")))
+        power = field.travel_power()
+        if self.travel_m_rad is None or not power or rotary == unit:
+            return {unit: 1.0}
+        return {rotary: self.travel_m_rad**power, unit: 1.0}
+
+    def upside_down(self, text: Any, field: Field) -> bool:
+        """Whether a text states one over the value: a speed constant, a sampling rate, a pitch."""
+        for unit in self._units(field):
+            with suppress(InputError):
+                parse_quantity(text, unit)
+                return False
+            if _turned(field.path, text, unit) is not None:
+                return True
+        return False
 
     def limit(self, text: Any, unit: str) -> float:
         """A limit of a requirement, in the unit in which its quantity is reported; amperes as of [limits]."""

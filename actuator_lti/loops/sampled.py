@@ -4,7 +4,7 @@ from functools import partial
 
 import numpy as np
 
-from actuator_lti.drive.wiring import COMMANDS, Drive
+from actuator_lti.drive.wiring import COMMANDS, MEASURED, Drive
 from actuator_lti.loops.limiters import LimiterPath, Response, limiter_paths
 from actuator_lti.loops.periodic import cyclic, fundamental, phase_blocks, point_blocks, shown
 from actuator_lti.loops.result import Loop, loop_of
@@ -42,6 +42,13 @@ def reference_to_output(wired: Drive) -> PlainSystem:
     source, signal, every, label = whole_path(wired)
     block = fundamental_path(TickProgram(wired, wired.outermost), every, "ref", signal)
     return _system(block.shown(), "reference_to_output", source, label, every * wired.tick_s)
+
+
+def answer(wired: Drive, stage: str) -> PlainSystem:
+    """Command of a stage to what it measures, inner loops closed and outer ones absent, at its instants."""
+    program, source, signal = TickProgram(wired, stage), COMMANDS[stage], MEASURED[stage]
+    block = fundamental_path(program, wired.interval[stage], "ref", signal)
+    return _system(block.shown(), f"{stage}_answer", source, signal, wired.period_s(stage))
 
 
 def fundamental_path(program: TickProgram, every: int, source: str, signal: str) -> Block:

@@ -12,7 +12,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
-from math import sqrt
+from math import pi, sqrt
 from typing import Any, TypeVar
 
 from actuator_lti.asked.quantities import MOST_RESONANCE_DB
@@ -35,6 +35,7 @@ from analyses.isolation import attempt
 HELD = {"current": "rotor locked", "velocity": "load moment held"}
 """How an inner loop is judged that is unstable by itself, by its name."""
 OPEN = {"current": "outer loops open and rotor free", "velocity": "outer loops open"}  # how it stands then
+FED_BACK = {"current": "the current", "velocity": "the measured speed"}
 AWAY = "the load, cogging or falling friction drives it away"
 ACTIVE = "held over a tick, as here and in the simulator, a slope over the angle is slightly active"
 
@@ -199,6 +200,8 @@ def all_loop_figures(
                 result[name] = _position(loops, loop, step=step, certify=certify)
             else:
                 result[name] = loop_figures(loop, step=step, certify=certify)
+            if name != "position" and result[name].stable:
+                result[name] = _with_law_told(loops, result[name], step)
             if name == "velocity" and result[name].stable:
                 result[name] = _with_speed_told(loops.design, result[name])
             if name == "current" and result[name].stable:
@@ -228,11 +231,33 @@ def all_loop_figures(
 def _with_speed_told(design: Design, figures: LoopFigures) -> LoopFigures:
     """The same of an outermost velocity loop with a note where its measured speed is not the speed itself."""
     encoder, velocity = design.encoder, design.controller.velocity
-    if velocity is None or design.controller.outermost != "velocity":
+    if velocity is None or design.controller.outermost != "velocity" or _takes_more(design, "velocity"):
         return figures
     if encoder.speed == "ideal" and not encoder.filter_time_s and not velocity.filters_on("speed"):
         return figures
     note = "velocity loop: bandwidth and step are of the measured speed, behind its estimate and filters"
+    return replace(figures, notes=(*figures.notes, note))
+
+
+def _takes_more(design: Design, name: str) -> bool:
+    """Whether a law at a stage takes more than the error: then no 1/(1 + L) is its answer to the command."""
+    own = design.controller.own_law
+    return own is not None and own[0] == name and own[1].inputs != ("error",)
+
+
+def _with_law_told(loops: Loops, figures: LoopFigures, step: bool) -> LoopFigures:
+    """The same with a note of how a stage answers its command whose law takes more than the error."""
+    name = figures.loop.name
+    if not _takes_more(loops.design, name):
+        return figures
+    note = f"{name} loop: bandwidth and step are of the feedback alone, at what the law gives"
+    if step and loops.tick_system is not None:
+        system, what = sampled.answer(loops.tick_system.program.drive, name), FED_BACK[name]
+        band = _if_there_is(lambda: closed_loop_bandwidth(system).minus3db_rad_s, [])
+        own = _if_there_is(lambda: step_figures(system), [])
+        if band is not None and own is not None:
+            note += f"; {what} answers its command with -3 dB at {band / (2.0 * pi):.4g} Hz, an overshoot of "
+            note += f"{own.overshoot_percent:.4g} %, and is within 2 % after {own.settling_time_s:.4g} s"
     return replace(figures, notes=(*figures.notes, note))
 
 

@@ -17,9 +17,12 @@ from actuator_lti.design import (
     with_values,
     write_design,
 )
+from actuator_lti.design.field import Structure
+from actuator_lti.design.fields import FIELDS
 from actuator_lti.design.key_reference import explained
 from actuator_lti.design.loader import design_from_tree
 from actuator_lti.design.model import Gear
+from actuator_lti.design.stated import Frame
 from actuator_lti.design.writing import read_value, value_as_stated
 from actuator_lti.drive.facts import capability, steady_torque_Nm
 from actuator_lti.drive.sheet_figures import sheet_figures
@@ -104,6 +107,18 @@ def test_a_speed_constant_is_a_back_emf_constant_upside_down() -> None:
     for wrong in ("270 rpm/V", "-317 rpm/V", "3 rpm/A", "0 rpm/V"):
         with pytest.raises(InputError, match=r"motor\.back_emf_constant = .*allowed: "):
             with_overrides(design, {"motor.back_emf_constant": wrong})
+
+
+def test_a_width_upside_down_is_refused_with_its_share() -> None:
+    """10 of 317 rpm/V are 3.155 %; as a back-EMF constant of 10 rpm/V they were 32 times the value."""
+    speed = {"value": "317 rpm/V", "tolerance": {"kind": "normal", "std": "10 rpm/V"}}
+    motor = {"motor.torque_constant": "30.2 mN*m/A", "motor.back_emf_constant": speed}
+    with pytest.raises(InputError, match=r'upside down; allowed: a share, here "3.155 %", or V\*s/rad'):
+        with_overrides(AMBER, motor)
+    for width, std in (("1 mV*s/rad", 1e-3), ("3 %", 0.03 * 60.0 / (2 * pi * 317))):
+        speed["tolerance"]["std"] = width
+        held = with_overrides(AMBER, motor).parameters["motor.back_emf_constant"].tolerance
+        assert held.std == pytest.approx(std, rel=1e-14)
 
 
 def test_an_ac_servo_runs_as_fast_as_its_bus_allows() -> None:
@@ -256,8 +271,10 @@ def test_periods_of_cogging_are_those_of_a_revolution_or_of_a_magnet_pitch() -> 
     # a bare number is per revolution of a rotary motor behind a screw, as its sheet has it
     motor = with_overrides(screw, {"motor.cogging_periods": 20, "motor.cogging": "1 mN*m"}).motor
     assert motor.cogging_periods == pytest.approx(20 / screw.screw.travel_m_rad, rel=1e-14)
-    motor = with_overrides(emps, {"motor.cogging_periods": "24 mm"}).motor
-    assert motor.cogging_periods == pytest.approx(2 * pi / 0.024, rel=1e-14)
+    for constants in ("dc", "rms-line", "peak-phase"):  # a pitch has no convention
+        frame = Frame(Structure.of(emps), constants)
+        periods = frame.quantity("24 mm", FIELDS["motor.cogging_periods"])
+        assert periods == pytest.approx(2 * pi / 0.024, rel=1e-14)
     with pytest.raises(InputError, match=r"cogging_periods.*wrong dimension"):
         with_overrides(AMBER, {"motor.cogging_periods": "24 mm"})
 

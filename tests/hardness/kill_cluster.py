@@ -21,7 +21,8 @@ from multiprocessing.context import ForkProcess
 from pathlib import Path
 
 import pyarrow.parquet  # noqa: F401 - here, not in every child
-from distributed.cli import dask_scheduler, dask_worker
+from distributed import cli
+from distributed.cli import dask_scheduler, dask_worker  # noqa: F401
 
 from actuator_lti import NumericalError, load_design
 from analyses.comparison.variants import compare
@@ -75,8 +76,6 @@ class Forked(ForkProcess):
 
 
 class Cluster:
-    """A scheduler and its workers, each started as a program: from here, with an environment of its own."""
-
     def __init__(self, folder: Path) -> None:
         self.file, self.log = folder / "scheduler.json", folder / "cluster.log"
         self.scheduler: subprocess.Popen[bytes] | Forked | None = None
@@ -107,13 +106,21 @@ class Cluster:
     def _process(
         self, environment: dict[str, str], kind: str, *words: str
     ) -> subprocess.Popen[bytes] | Forked:
-        command = [sys.executable, "-m", f"distributed.cli.{kind}", *self._words, *words]
+        """A program of the library; forked where no thread runs and the library is there."""
+        words = ("--no-dashboard", "--host", "127.0.0.1", "--scheduler-file", str(self.file), *words)
+        if __name__ == "__main__" and not environment:
+            process = Forked(target=self._serve, args=(kind, words))
+            process.start()
+            return process
+        command = [sys.executable, "-m", f"distributed.cli.{kind}", *words]
         with self.log.open("ab") as log:
             return subprocess.Popen(command, stdout=log, stderr=log, env={**os.environ, **environment})
 
-    @property
-    def _words(self) -> tuple[str, ...]:
-        return ("--no-dashboard", "--host", "127.0.0.1", "--scheduler-file", str(self.file))
+    def _serve(self, kind: str, words: tuple[str, ...]) -> None:
+        with self.log.open("ab") as log:
+            os.dup2(log.fileno(), 1)
+            os.dup2(log.fileno(), 2)
+        getattr(cli, kind).main(words)
 
     def kill(self, victim: str, draw: random.Random) -> None:
         if victim == "scheduler":
@@ -128,22 +135,6 @@ class Cluster:
             process.kill()
             process.wait()
         self.scheduler, self.workers = None, []
-
-
-class ForkedCluster(Cluster):
-    """The same programs, of which no process loads the library anew."""
-
-    def _process(self, environment: dict[str, str], kind: str, *words: str) -> Forked:
-        assert not environment
-        process = Forked(target=self._serve, args=(kind, *words))
-        process.start()
-        return process
-
-    def _serve(self, kind: str, *words: str) -> None:
-        log = os.open(self.log, os.O_WRONLY | os.O_CREAT | os.O_APPEND)
-        os.dup2(log, 1)
-        os.dup2(log, 2)
-        {"dask_scheduler": dask_scheduler, "dask_worker": dask_worker}[kind].main([*self._words, *words])
 
 
 def child(number: int, folder: Path, engine: Engine) -> int:
@@ -224,7 +215,7 @@ def one_study(number: int, top: Path, cluster: Cluster, draw: random.Random) -> 
 def main(top: Path, kills: int, seed: int) -> dict[str, object]:
     """Disturb one study after the other until there were enough kills."""
     draw, met, number = random.Random(seed), Counter[str](), 0
-    cluster = ForkedCluster(top)
+    cluster = Cluster(top)
     try:
         while met.total() < kills:
             met.update(one_study(number, top, cluster, draw))

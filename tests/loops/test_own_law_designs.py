@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from loop_designs import controlled
+from loop_designs import controlled, source_drive
 from own_laws import as_law, linear, stepped
 from scipy.linalg import solve_discrete_are
 from scipy.signal import place_poles
@@ -14,11 +14,12 @@ from scipy.signal import place_poles
 from actuator_lti import Design, assemble_loops, load_design, plant, stability_margins
 from actuator_lti.batch import Population, linear_figures
 from actuator_lti.compiled.compiler import system_compiler
-from actuator_lti.design.model import Encoder, PositionLoop, Requirement
+from actuator_lti.design.model import Encoder, PositionLoop, Requirement, VelocityLoop
 from actuator_lti.drive.steady import torque_gain_Nm_rad
 from actuator_lti.errors import InputError
 from analyses import survey_loops, validate
 from analyses.linear.code_check import check_code
+from analyses.linear.loop_figures import all_loop_figures
 from analyses.tuning import tune
 from analyses.tuning.start import rule_gains
 from analyses.validation import CHECKS, QUICK
@@ -156,6 +157,21 @@ def test_it_stays_as_it_is_while_the_rest_moves(stage: str) -> None:
     gains = rule_gains(design).values
     assert others <= set(gains)
     assert not any(path.startswith(f"control.{stage}.") for path in gains)
+
+
+def test_the_answer_to_the_command_of_a_law_that_takes_more_than_the_error() -> None:
+    """An integral of the error less a gain on the speed, on a free mass: L/(1 + L) has a zero, this none."""
+    gain, integral = 0.3, 0.06  # of the speed that is gained in a period
+    base = source_drive(1.0, 1.0, 1e-3, 1e6, controller={"velocity": VelocityLoop(gain=1.0)})
+    law = ([[1.0]], [[integral, 0.0]], [[1e3]], [[0.0, -1e3 * gain]], 1e-3)
+    (figures,) = all_loop_figures(assemble_loops(base.with_law("velocity", law, ["error", "speed"]))).values()
+    speed, x = [0.0], 0.0
+    for _ in range(400):
+        speed, x = [*speed, speed[-1] + x - gain * speed[-1]], x + integral * (1.0 - speed[-1])
+    (note,) = (one for one in figures.notes if "of the feedback alone" in one)
+    told = float(note.partition("overshoot of ")[2].partition(" %")[0])
+    assert told == pytest.approx(100.0 * (max(speed) / speed[-1] - 1.0), rel=1e-3)
+    assert figures.step.overshoot_percent > 2.0 * told
 
 
 def test_the_rule_of_the_position_takes_the_crossover_of_the_law_inside() -> None:

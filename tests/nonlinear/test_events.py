@@ -100,28 +100,17 @@ def test_friction_above_the_stall_torque_never_moves_and_a_coasting_drive_comes_
 TICKS = np.arange(24)
 SQUARE = 4.0 * np.sign(np.sin(2 * np.pi * TICKS / 13 + 0.3))
 WAVE = 0.5 * np.sin(TICKS / 5)
-FRICTION = {
-    "dry_torque_Nm": 0.05, "dry_torque_reverse_Nm": 0.03, "viscous_Nms_rad": 1e-4, "load_coefficient": 0.02,
-    "breakaway_ratio": 1.3, "offset_torque_Nm": 0.01,
-}  # fmt: skip
 LOAD = {"dry_torque_Nm": 0.3, "viscous_Nms_rad": 1e-3, "breakaway_ratio": 1.2, "offset_torque_Nm": 0.02}
 CURVE = stribeck((0, 0.06), (5, 0.02), (40, 0.03), (80, 0.05))
 BACKWARD = stribeck((0, 0.03), (30, 0.01), direction="reverse")
 ONE_SIDED = BACKWARD + stribeck((0, 0.06), (5, 0.02), direction="forward")
 TIGHT, BY_LOAD = {"play_rad": 0.0}, {"load_coefficient": 0.13}
 MAPPED = {"points": CURVE, "load_coefficient": 0.01}
-HARD = {
-    "play and damping": ({}, 0.0),
-    "play without damping": ({"coupling": {"damping_Nms_rad": 0.0}}, 0.0),
+HARD = {  # what `random_drive` draws seldom or never
     "play, damped beyond its critical value": ({"coupling": {"damping_Nms_rad": 0.6}}, 0.0),
     "bilateral": ({"coupling": TIGHT}, 0.0),
-    "stick of both sides": ({"friction": FRICTION, "load_friction": LOAD}, 0.0),
     "friction follows the sign of T_s": (
         {"coupling": TIGHT, "friction": {"load_coefficient": 0.03, "dry_torque_Nm": 0.01}},
-        WAVE,
-    ),
-    "self-locking stage": (
-        {"path": "self-locking", "friction": {**BY_LOAD, "dry_torque_Nm": 0.01}, "load_friction": LOAD},
         WAVE,
     ),
     "self-locking, bilateral": ({"path": "self-locking", "friction": BY_LOAD, "coupling": TIGHT}, WAVE),
@@ -149,7 +138,7 @@ def test_hard_case(name: str, source: bool, fraction: float) -> None:
 @pytest.mark.parametrize("seed", range(8))
 def test_random_drive(seed: int) -> None:
     design, voltages, moments, fraction_s = random_drive(seed)
-    agreeing(design, voltages, moments, part=fraction_s / design.controller.period_s)
+    assert sum(agreeing(design, voltages, moments, part=fraction_s / design.controller.period_s).events) > 0
 
 
 SINES = ((0.3, 2.0), (0.02, 15.0), (1e-3, 70.0))  # rad, Hz
@@ -297,7 +286,6 @@ def test_balance_passivity_and_the_same_motion_without(seed: int) -> None:
         assert run.events == without.events
 
 
-AMBER = load_design("ilr33-amber")
 RATIOS = {"planetary": 66, "worm": 36, "chain": 2}
 CHAIN = {
     "gear": [{"name": name, "ratio": ratio} for name, ratio in RATIOS.items()],

@@ -212,9 +212,6 @@ def test_profile_leaves_a_command_within_its_limits_untouched_and_holds_that_of_
     assert ramped[-1] == pytest.approx(0.2, rel=1e-12)
 
 
-AMBER = load_design("ilr33-amber")
-
-
 def smooth(width: float = 1.0, **friction: float) -> Design:
     return changed(AMBER, friction={"law": "tanh", "smoothing_speed_rad_s": width, **friction})
 

@@ -56,13 +56,6 @@ def test_nobody_waits_for_a_library_that_is_not_used(code: str) -> None:
     assert not loaded(code) & LIGHT[code]
 
 
-def test_margins_in_json_and_nothing_else(cli) -> None:
-    assert cli.text("--version").startswith("actuator-lti ")
-    ran = cli("margins", "--json")
-    assert (ran.status, ran.err, ran.data["passed"], len(ran.data["requirements"])) == (0, "", True, 12)
-    assert ran.data["loops"]["velocity"]["phase_margin_deg"] == pytest.approx(73.70, abs=0.01)
-
-
 @pytest.mark.parametrize("form", ["continuous", "ideal"])
 def test_margins_on_the_terminal_name_every_loop(form: str, cli) -> None:
     words = cli.text("margins", "ilr33-amber", "--form", form)

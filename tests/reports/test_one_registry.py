@@ -19,7 +19,6 @@ from reports import document as doc
 from reports.analyses import ANALYSES, FURTHER, Analysis
 from reports.as_json import as_json
 from reports.cli.app import PANELS
-from reports.document import load
 from reports.html import script
 from reports.live.model import live_model
 from reports.nightly.changes import Columns
@@ -128,11 +127,3 @@ def test_the_json_of_a_result_is_its_fields_and_properties() -> None:
     assert cmath.rect(size, radians(phase_deg)) == pytest.approx(seen.foreseen_Nm_rad, rel=1e-12)
     assert own["difference"] == seen.difference
     json.dumps(told, allow_nan=False)
-
-
-def test_the_page_of_a_command_is_its_section(tmp_path, cli) -> None:
-    shown = cli.text("stiffness", "emps", "--out", tmp_path, "--quiet")
-    first = load(tmp_path / "stiffness.json")["sections"][0]
-    assert shown.splitlines()[0] == f"PASS  emps: {first['result']}"
-    assert "<svg" in (tmp_path / "stiffness.html").read_text(encoding="utf-8")
-    assert all(block["caption"] in shown for block in first["blocks"] if block["kind"] == "table")

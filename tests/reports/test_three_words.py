@@ -190,14 +190,18 @@ def test_without_requirements_margins_below_custom_are_named(written, cli) -> No
 def test_terminal_json_page_pdf_and_section_have_one_verdict(
     call, word: str, tmp_path, cli, monkeypatch
 ) -> None:
-    """The first line of the terminal is the verdict; no table is wider than it."""
+    """The first line of the terminal is verdict and result; its tables are the section's, none is wider."""
     monkeypatch.setenv("COLUMNS", "80")
     monkeypatch.chdir(tmp_path)
     said, *rest = cli.text(*call, "--out", "out", status=int(word != "met")).splitlines()
-    assert said.startswith(HEADS[word])
     tables = [line for line in rest if not line.startswith(("note:", "  ", "out/"))]
     assert max(map(len, tables)) <= 80
     document = load(next(tmp_path.glob("out/*.json")))
+    first = document["sections"][0]
+    assert said == f"{HEADS[word]}  {document['design']['name']}: {first['result']}"
+    told = " ".join(" ".join(rest).split())
+    captions = [block["caption"] for block in first["blocks"] if block["kind"] == "table"]
+    assert call[0] == "duty" or all(one in told for one in captions)  # whose rows are its facts there
     assert (document["verdict"]["verdict"], document["verdict"]["passed"]) == (word, word == "met")
     (overall,) = printable(document)["overall"]
     assert overall[1] == Verdict(word).role()

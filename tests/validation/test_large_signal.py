@@ -222,9 +222,6 @@ def test_a_flat_friction_map_is_dry_friction() -> None:
     assert [rubs(one) for one in (plain, flat, changed(plain, friction=none))] == [True, True, False]
 
 
-AMBER = load_design("ilr33-amber")
-
-
 def mapped(design: Design, counts: tuple[int, int] = (2, 9)) -> AmplitudeMap:
     return amplitude_map(design, assemble_loops(design), counts=counts)
 
