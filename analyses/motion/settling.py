@@ -245,6 +245,10 @@ def _size(rest: Rest, factor: float, unit: str) -> str:
     return size
 
 
+def _beyond(rest: Rest) -> str:
+    return f"followed for {rest.after_s:.3g} s beyond the run"
+
+
 @dataclass(frozen=True)
 class Conduct:
     """What a run ends in, the command and the load staying as they are at its end."""
@@ -293,11 +297,11 @@ def conduct(run: Trajectory, full_deflection_rad: float = 0.0) -> Conduct:
     if not rest.comes_to_rest:
         text = words(rest, factor, unit).removeprefix("limit cycle of ").removeprefix("still moving ")
         unseen = shorter or rest.verdict == "diverging"
-        beyond = f"followed for {rest.after_s:.3g} s beyond the run" if unseen else ""
-        return Conduct(rest.verdict, text, beyond)
+        return Conduct(rest.verdict, text, _beyond(rest) if unseen else "")
     limits = [f"{n} limit of {run.limits[n].limit:.4g} {run.limits[n].unit}" for n in rest.limited]
     if limits:
-        return Conduct("sits on a limit", ", ".join(limits))
+        unseen = not any(run.limits[name].fraction for name in rest.limited)
+        return Conduct("sits on a limit", ", ".join(limits), _beyond(rest) if unseen else "")
     faint = faint_words(rest, factor, unit) if rest.amplitude and not shorter else ""
     left = abs(float(run.reference_rad[-1] - run.followed[-1]) - rest.error)
     far = left > NEAR * np.abs([*run.followed, run.reference_rad[-1]]).max()

@@ -186,6 +186,15 @@ def test_a_period_longer_than_the_run_is_seen_beyond_it(cli) -> None:
     assert float(beyond) > int(periods) / float(hertz) > 100.0
 
 
+def test_a_limit_that_acts_only_after_the_run_says_so() -> None:
+    """A torque drive runs up until its voltage is at its end; in a millisecond it has hardly moved."""
+    torque = changed(AMBER, controller={"position": None, "velocity": None})
+    early, late = (conduct(simulate(torque, commands.step(3.0), time)) for time in (1e-3, 2.0))
+    assert early.status == late.status == "sits on a limit"
+    assert re.fullmatch(r"followed for \S+ s beyond the run", early.later)
+    assert not late.later
+
+
 def test_what_diverges_only_after_the_run_says_so() -> None:
     """Twice what the back-drivable joint holds carries it off; in the first tick nothing has moved yet."""
     joint = load_design("joint")
