@@ -239,8 +239,8 @@ class Design:
 
     @cached_property
     def controller_model(self) -> "Design":
-        """The drive whose J, kM, R and kE feed-forward computes with: the nominal one of its data sheet."""
-        return replace(self if self.nominal is None else self.nominal, temperature=None)
+        """The drive whose J, kM, R and kE feed-forward computes with: the nominal one, as its file has it."""
+        return self.nominal or self
 
     @cached_property
     def effective_motor(self) -> Motor:
