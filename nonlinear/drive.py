@@ -1,7 +1,10 @@
 """The drive one tick at a time, and its controller alone, for rigs, tests and hardware in the loop."""
 
+from collections.abc import Callable
 from contextlib import suppress
+from functools import cached_property
 from math import isfinite
+from typing import Any
 
 import numpy as np
 
@@ -11,7 +14,7 @@ from actuator_lti.start.border import asked
 from actuator_lti.types import Floats
 from nonlinear._kernels import layout as at
 from nonlinear.commands import numbers_of
-from nonlinear.native import control_tick, parameters, tick
+from nonlinear.native import LIBRARY, parameters
 from nonlinear.row.parameters import design_row
 from nonlinear.runs.setup import put_state
 from nonlinear.runs.trajectory import ADVICE, STATUS, State
@@ -72,6 +75,18 @@ class Drive:
     def __repr__(self) -> str:
         return f"<Drive {self.design.name}: tick {self.value('tick'):.0f}>"
 
+    def __getstate__(self) -> dict[str, Any]:
+        """What is copied: calls that hold the places of these arrays are not."""
+        return {name: kept for name, kept in vars(self).items() if name not in ("_tick", "_control_tick")}
+
+    @cached_property
+    def _tick(self) -> Callable[[], int]:
+        return LIBRARY.functions.tick.bound(self._p, self._s, self._io)
+
+    @cached_property
+    def _control_tick(self) -> Callable[[], float]:
+        return LIBRARY.functions.control_tick.bound(self._p, self._s, self._io)
+
     def step(self, command: float, load_Nm: float = 0.0, torque_Nm: float = 0.0) -> None:
         """One tick of controller and plant.
 
@@ -86,7 +101,7 @@ class Drive:
         if load_Nm or torque_Nm or self._p[at.RARE_LOAD]:
             self._p[at.RARE_LOAD] = 1.0
             self._io[at.IN_LOAD], self._io[at.IN_TORQUE] = load_Nm, torque_Nm
-        status = STATUS[tick(self._p, self._s, self._io)]
+        status = STATUS[self._tick()]
         if status != "ok":
             raise NumericalError(f"tick {self.value('tick'):.0f} ({status}): {ADVICE[status]}")
 
@@ -118,7 +133,7 @@ class Drive:
         self._io[at.IN_COMMAND] = command
         self._io[at.IN_CURRENT : at.IN_OUTPUT_SPEED + 1] = measured
         self._io[at.IN_BUS] = bus_V
-        return control_tick(self._p, self._s, self._io)
+        return self._control_tick()
 
     def get(self) -> Floats:
         """A copy of the whole state."""

@@ -30,7 +30,7 @@ from nonlinear.bench.probe import Probe, write_probe
 from nonlinear.native import parameters
 from nonlinear.row.parameters import design_rows
 from nonlinear.runs.batch import Progress, run_rows
-from nonlinear.runs.reduced import COLUMNS, BatchResult, step_numbers
+from nonlinear.runs.reduced import COLUMNS, BatchResult
 from nonlinear.runs.running import Running
 from nonlinear.runs.setup import Tables
 from nonlinear.runs.simulation import run_row
@@ -162,14 +162,7 @@ class Rows(Compared):
 
         With ``drives`` (`running`, one a row) each goes on from where it is, and stays where its row ends.
         """
-        tables = self.tables.joined()
-        result = run_rows(self.values, tables, threads=threads, progress=progress, drives=drives)
-        if self.design.controller.position is None and drives is None:
-            for k in np.flatnonzero(self["step_target"]):  # what the kernel takes of an output's angle
-                followed = self.trajectory(int(k)).followed / self["step_target"][k]
-                numbers = step_numbers(followed, float(self["step_band"][k]))
-                result.outs[k, at.OUT_STEP : at.OUT_STEP + at.STEP_SIZE] = numbers
-        return result
+        return run_rows(self.values, self.tables.joined(), threads=threads, progress=progress, drives=drives)
 
     def running(self, k: int = 0) -> Running:
         """One row at its start, to go on from piece by piece."""

@@ -193,12 +193,12 @@ class Design:
             return len(self.gears)
         return [gear.name for gear in self.gears].index(self.coupling.after) + 1
 
-    @property
+    @cached_property
     def ratio_to_coupling(self) -> float:
         """N_c, motor angle over coupling angle."""
         return prod(gear.ratio for gear in self.gears[: self.gears_before_coupling])
 
-    @property
+    @cached_property
     def ratio_behind_coupling(self) -> float:
         """N_r, coupling angle over output angle; 1 where the drive train is rigid."""
         return prod(gear.ratio for gear in self.gears[self.gears_before_coupling :])
@@ -239,8 +239,8 @@ class Design:
 
     @cached_property
     def controller_model(self) -> "Design":
-        """The drive whose J, kM, R and kE feed-forward computes with: the nominal one of its data sheet."""
-        return replace(self if self.nominal is None else self.nominal, temperature=None)
+        """The drive whose J, kM, R and kE feed-forward computes with: the nominal one, as its file has it."""
+        return self.nominal or self
 
     @cached_property
     def effective_motor(self) -> Motor:

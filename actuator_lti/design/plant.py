@@ -59,6 +59,14 @@ class Motor:
         return self.source_gain_Nm_V is None
 
     @property
+    def without_current(self) -> "Motor":
+        """The motor with its winding open: inertia and cogging stay, and at 0 V it gives no torque."""
+        return replace(
+            self, resistance_ohm=None, inductance_H=None, torque_constant_Nm_A=None,
+            back_emf_constant_Vs_rad=None, source_gain_Nm_V=self.source_gain_Nm_V or 1.0,
+        )  # fmt: skip
+
+    @property
     def over_angle(self) -> OverAngle:
         cogging = Wave(self.cogging_Nm, self.cogging_periods, self.cogging_phase_rad, averages=True)
         return OverAngle(waves=(cogging,))

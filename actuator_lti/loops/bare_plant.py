@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from actuator_lti.design.loader import as_design
+from actuator_lti.design.model import Command
 from actuator_lti.drive.operating import Operating
 from actuator_lti.drive.wiring import COMMANDS, Drive, wire
 from actuator_lti.errors import InputError
@@ -43,7 +44,7 @@ def plant(
     "ideal": without delay.
     ``rotor``: "free", or "locked": only the electrical part.
     ``command``: the first input: "u", the voltage in V (of an ideal source its drive signal), or "i_ref", the
-    current command in A of the design's own current loop.
+    current command in A of the design's own current loop, which measures a speed that it takes in every tick.
     ``operating_point``: slope of the friction and contact of the coupling, see
     `actuator_lti.drive.operating.Operating`.
     ``load_Nm``: load torque at the output shaft: more dry friction.
@@ -69,7 +70,7 @@ def plant(
     elif control.current is None:
         raise InputError(f"command = 'i_ref': the design {design.name} has no current loop")
     at = Operating(point=operating_point, load_Nm=load_Nm, rotor=rotor)
-    wired = wire(replace(design, controller=control), at)
+    wired = wire(replace(design, controller=control, command=Command()), at)
     assert COMMANDS[wired.outermost] == command
     return _sampled(wired, command) if form == "sampled" else _continuous(wired, command, form)
 

@@ -55,6 +55,11 @@ class Loop:
     periodic: bool = False
     rotor: RotorState = "free"
 
+    @property
+    def at_law(self) -> bool:
+        """Whether it is the loop of a stage, cut at what a law of one's own gives."""
+        return self.plain_open.source == self.break_point and not self.name.startswith("at ")
+
     @cached_property
     def open_loop(self) -> Any:
         """L as a python-control system.

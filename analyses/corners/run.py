@@ -146,9 +146,9 @@ def _made(design: Design, asked: Asked) -> Iterator[tuple[str, str, Design]]:
 
 
 def at_temperature(design: Design, degC: float) -> Design:
-    """The design with winding and magnets at a temperature."""
-    heat = design.temperature or Temperature()
-    return replace(design, temperature=replace(heat, winding_degC=degC, magnet_degC=degC))
+    """The design with winding and magnets at a temperature that its controller does not know."""
+    heat = replace(design.temperature or Temperature(), winding_degC=degC, magnet_degC=degC)
+    return replace(design, temperature=heat, nominal=design.nominal or design)
 
 
 def _thickened(design: Design, factor: float) -> Design:

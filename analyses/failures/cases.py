@@ -101,6 +101,8 @@ class Rig:
     def fail(self, broken: Design) -> None:
         """Go on with another plant from the same angles, speeds, current and voltage."""
         state = self.measured()
+        if not broken.motor.has_electrical_dynamics:
+            state = replace(state, current_A=0.0, voltage_V=0.0)
         if self.design.coupling is None:  # no twist, and one speed
             state = replace(state, output_angle_rad=None, output_speed_rad_s=None)
         self.plant = Drive(plant_of(broken), state, self.load_Nm)
@@ -133,7 +135,6 @@ class Rig:
 
 
 HELD = 1e6  # times the stall torque: no torque of the drive moves a jam
-OPEN = 1e4  # times the resistance: of a winding with an open phase
 
 Course = Callable[[float], float]
 
@@ -256,11 +257,9 @@ def jammed(design: Design) -> Design:
 
 
 def _open(rig: Rig) -> None:
-    """No current flows; an ideal torque source gives nothing."""
-    motor = rig.design.motor
+    """No current flows."""
     rig.driving = lambda _, bus: 0.0
-    if motor.resistance_ohm is not None:
-        rig.fail(replace(rig.design, motor=replace(motor, resistance_ohm=OPEN * motor.resistance_ohm)))
+    rig.fail(replace(rig.design, motor=rig.design.motor.without_current, supply=None, temperature=None))
 
 
 def _sense(rig: Rig, *, zero: bool = False) -> None:

@@ -255,11 +255,7 @@ def unpowered(design: Design, winding: State) -> Design:
     bare = replace(design, controller=replace(design.controller, position=None, velocity=None, current=None))
     if winding == "shorted" and design.motor.has_electrical_dynamics:
         return bare
-    idle = replace(  # its cogging stays
-        design.motor, resistance_ohm=None, inductance_H=None, torque_constant_Nm_A=None,
-        back_emf_constant_Vs_rad=None, source_gain_Nm_V=1.0,
-    )  # fmt: skip
-    return replace(bare, motor=idle, supply=None, temperature=None)
+    return replace(bare, motor=design.motor.without_current, supply=None, temperature=None)
 
 
 def _telling_loads(design: Design) -> tuple[float, ...]:

@@ -88,7 +88,7 @@ from actuator_lti.drive import signals
     WINDOW,  # ticks of one reducer window, 0: none
     CYCLES,  # whole cycles in the window
     HARMONICS,
-    STEP_TARGET,  # output angle, rad; 0: no step figures
+    STEP_TARGET,  # of what the command orders, in its unit; 0: no step figures
     STEP_BAND,
     HAS_POSITION,
     POSITION_INTEGRAL,  # Kv Tp/Ti

@@ -54,6 +54,15 @@ def clear(p, out):
         out[layout.OUT_PHASOR + 2], out[layout.OUT_PHASOR + 3] = math.cos(turn), math.sin(turn)
 
 
+def followed(p, io):
+    """What the command orders: way of the output since the start, its speed, current, voltage."""
+    if p[layout.HAS_POSITION] > 0.0:
+        return io[layout.IO_OUTPUT] - p[layout.ANGLE_START] / p[layout.RATIO]
+    if p[layout.HAS_VELOCITY] > 0.0:
+        return io[layout.IO_SPEED] / p[layout.RATIO]
+    return io[layout.IO_CURRENT] if p[layout.HAS_CURRENT] > 0.0 else io[layout.IO_VOLTAGE]
+
+
 def step_figures(y, y_last, k, band, out):
     """Update rise, peak and settling of a response normalised to its target; times in ticks."""
     at = layout.OUT_STEP
@@ -115,7 +124,7 @@ def add_to_window(p, io, k, count, out):
 def reduce(p, io, k, out):
     """Add tick k to whatever is kept of the run."""
     if p[layout.STEP_TARGET] != 0.0:
-        y = (io[layout.IO_OUTPUT] - p[layout.ANGLE_START] / p[layout.RATIO]) / p[layout.STEP_TARGET]
+        y = followed(p, io) / p[layout.STEP_TARGET]
         step_figures(y, out[layout.OUT_STEP_BEFORE], k, p[layout.STEP_BAND], out)
         out[layout.OUT_STEP_BEFORE] = y
     count = layout.ALL_SIGNALS if p[layout.PROBING] > 0.0 else layout.BASE_SIGNALS

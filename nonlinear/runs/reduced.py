@@ -31,20 +31,6 @@ def whole_periods(
     return cycles / (ticks * period_s), ticks, cycles
 
 
-def step_numbers(y: Floats, band: float) -> Floats:
-    """The numbers of the kernel's ``OUT_STEP`` of a response over its target, one value a tick."""
-
-    def passed(level: float) -> float:
-        there = np.flatnonzero(y >= level)
-        k = int(there[0]) if there.size else -1
-        return float(k - (y[k] - level) / (y[k] - y[k - 1])) if k > 0 else float(k)
-
-    settled = int(np.flatnonzero(np.append(True, np.abs(y - 1.0) > band))[-1])
-    return np.array(
-        [passed(0.1), passed(0.9), max(y.max(), 0.0), settled if settled < y.size else -1.0, y[-1]]
-    )
-
-
 @dataclass(frozen=True, eq=False)
 class StepFigures(Compared):
     """Step response of each run, relative to the target; NaN where a level was not reached."""

@@ -61,7 +61,8 @@ class Reducers:
     the fundamental in it (see `nonlinear.runs.reduced.whole_periods`); 0: no windows.
     ``harmonics``: correlated in the windows, 0 to 9.
     ``extremes``: minimum and maximum of every signal over the whole run.
-    ``step_target_rad``: output angle that a step asks for; gives rise, peak and settling. 0: none.
+    ``step_target_rad``: what a step asks for; of a drive without position loop the speed, current or voltage
+    in its unit. Gives rise, peak and settling; 0: none.
     ``step_band``: settling band, relative to the target.
     """
 

@@ -1,8 +1,11 @@
 """Dry friction at small signals: threshold, lost motion, standing error, limit cycles."""
 
+import math
+
 import numpy as np
 
 from actuator_lti.design.model import Command, Design
+from actuator_lti.drive.steady import torque_gain_Nm_rad
 from analyses.friction_effects.result import FrictionEffects, FrictionPoint
 from analyses.limit_cycles.run import Confirmation
 from analyses.motion.settling import FROM_THE_LARGEST, Settling, accepted_rad, noticed, told, verdict_of
@@ -36,7 +39,7 @@ def section(result: FrictionEffects) -> doc.Section:
 
 def _cycle_verdict(design: Design, point: FrictionPoint, fine: Unit, load: str) -> doc.VerdictItem:
     cycles, swing = point.cycles, noticed(design, point.cycles.settlings)
-    slip = "none"
+    slip = "none" if design.controller.own_law is None else "not made of a law of one's own"
     if (one := cycles.stick_slip) is not None:
         size, kind = fine.of(one.output_amplitude_rad), "" if one.stable else ", unstable"
         slip = f"±{size} at {one.frequency_hz:.3g} Hz{kind}"
@@ -93,13 +96,22 @@ def _threshold_table(result: FrictionEffects, fine: Unit, load: str) -> doc.Bloc
         f"{_behind(result)}."
     )
     if not any(point.threshold for point in result.points):
-        note = "The smoothed law of friction creeps: it has no threshold, and holds no motion at a reversal."
+        note = _without(result.design)
     elif not all(point.threshold for point in result.points):
         note += " A load without figures gives a forward step no threshold."
     if result.design.command != Command():
         note += " Steps as they come behind the profile and filter of the command."
     title = "Threshold of motion, and motion lost at a reversal of the command"
     return doc.listing(title, result.points, columns, note)
+
+
+def _without(design: Design) -> str:
+    """Why no load has a threshold."""
+    if design.friction.law == "tanh":
+        return "The smoothed law of friction creeps: it has no threshold, and holds no motion at a reversal."
+    if not math.isfinite(torque_gain_Nm_rad(design)):
+        return "A law of one's own that integrates has no threshold: every step moves the output in its time."
+    return "No load gives a forward step a threshold."
 
 
 def _integrates(result: FrictionEffects) -> str:

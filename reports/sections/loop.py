@@ -37,8 +37,9 @@ def section(name: str, design: Design, figures: LoopFigures) -> doc.Section:
     period, evidence = figures.loop.period_s, figures.margins.evidence
     rate = "" if period is None else f", every {seconds(period)}"
     inner = "no loop inside it" if name == "current" else "the loops inside it closed"
+    place = "what its law gives" if figures.loop.at_law else "its error"
     intro = (
-        f"Cut at its error ({figures.loop.unit_in}){rate}, with {inner}. The margins are {evidence}: "
+        f"Cut at {place} ({figures.loop.unit_in}){rate}, with {inner}. The margins are {evidence}: "
         f"{margins.MEANING[evidence]}."
     )
     words, status = result(figures), margins.worst_status([figures.sound])
@@ -126,7 +127,8 @@ def step(
     panel.y.limits(low=min(0.0, 1.05 * lowest))
     if math.isfinite(figures.final_value) and not margins.returns(loop_figures):
         step_figures(panel, figures, responses[0], scale, held and len(responses[0][1]) < 80)
-    caption = f"{title}, response to a unit step of its command; the band is 2 % about the final value."
+    of = "the feedback alone" if loop_figures.of_feedback and loop_figures.loop.at_law else "its command"
+    caption = f"{title}, response to a unit step of {of}; the band is 2 % about the final value."
     if end is not None and float(figures.settling_time_s) > end:
         caption += " With the rotor free, back-EMF keeps it from settling within the time shown."
     return doc.figure("step", chart, caption=caption, alt=f"Step response. {caption}", layout="half")

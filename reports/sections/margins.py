@@ -237,9 +237,10 @@ def _loops(
         blocks, how = [], "The drive has no loop: its command is the voltage. "
     kinds = {one.margins.evidence for one in named.values()}
     meaning = " ".join(f"{kind.capitalize()}: {words}." for kind, words in MEANING.items() if kind in kinds)
+    law = ", that of a law at what the law gives," * any(one.loop.at_law for one in loops.values())
     intro = (
-        "Each loop is cut at its own error, with the loops inside it closed and those outside it open. "
-        f"{how}{meaning}"
+        f"Each loop is cut at its own error{law or ','} with the loops inside it closed and those outside it "
+        f"open. {how}{meaning}"
     )
     status = worst_status([one.sound for one in loops.values()])
     return doc.section(

@@ -325,3 +325,16 @@ def test_the_simulator_starts_above_one(load_Nm: float, margin: float, moves: bo
         for sign in (1.0, -1.0)
     ]
     assert all(np.abs(run.motor_speed_rad_s).max() > 1e-6 for run in runs) is moves
+
+
+@pytest.mark.parametrize("command", ["u", "i_ref"])
+@pytest.mark.parametrize("form", ["sampled", "continuous", "ideal"])
+def test_the_filter_of_the_command_is_no_part_of_the_plant(command: Any, form: Any) -> None:
+    """It filters the command of the position, not the volts or amperes of the law that is being made."""
+    drive = load_design("ilr33-amber")
+    filtered = with_overrides(drive, {"command.filter_time": "5 ms"})
+    plain, made = (plant(each, form=form, command=command) for each in (drive, filtered))
+    points = (
+        np.exp(1j * np.array([0.01, 0.3, 2.0])) if form == "sampled" else 1j * np.array([10.0, 200.0, 5e3])
+    )
+    assert np.array_equal(made(points), plain(points))

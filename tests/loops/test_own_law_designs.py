@@ -18,6 +18,7 @@ from actuator_lti.design.model import Encoder, PositionLoop, Requirement, Veloci
 from actuator_lti.drive.steady import torque_gain_Nm_rad
 from actuator_lti.errors import InputError
 from analyses import survey_loops, validate
+from analyses.friction_effects import friction_effects
 from analyses.linear.code_check import check_code
 from analyses.linear.loop_figures import all_loop_figures
 from analyses.tuning import tune
@@ -25,6 +26,9 @@ from analyses.tuning.start import rule_gains
 from analyses.validation import CHECKS, QUICK
 from reports.live.keys import followed
 from reports.live.model import live_model
+from reports.sections.friction_effects import section as friction_section
+from reports.sections.loop import section
+from tests.changed import changed
 
 
 def poles(design: Design) -> np.ndarray:
@@ -172,6 +176,29 @@ def test_the_answer_to_the_command_of_a_law_that_takes_more_than_the_error() -> 
     told = float(note.partition("overshoot of ")[2].partition(" %")[0])
     assert told == pytest.approx(100.0 * (max(speed) / speed[-1] - 1.0), rel=1e-3)
     assert figures.step.overshoot_percent > 2.0 * told
+
+
+def test_the_page_says_where_the_loop_of_a_law_is_cut_and_whose_step_it_shows() -> None:
+    """At the amperes that it gives: an error of amperes, a step "of its command" are of no velocity loop."""
+    design = lead("velocity")
+    figures = all_loop_figures(assemble_loops(design))
+    pages = {name: section(name, design, one) for name, one in figures.items()}
+    assert pages["velocity"]["intro"].startswith("Cut at what its law gives (A), every")
+    assert pages["position"]["intro"].startswith("Cut at its error (rad), every")
+    assert "a unit step of the feedback alone" in f"{pages['velocity']}"
+    assert all("a unit step of its command" in f"{pages[name]}" for name in ("current", "position"))
+
+
+def test_why_a_drive_has_no_threshold_is_said_of_its_law_and_of_its_friction() -> None:
+    """Not "the smoothed law of friction creeps" of dry friction behind a law that integrates."""
+    smooth = load_design("ilr33-amber-tanh")
+    integral = ([[1.0]], [[0.01]], [[1.0]], [[0.1]], 1e-4)
+    own = load_design("ilr33-amber").with_law("velocity", integral, ["error"])
+    for design, words in ((smooth, "The smoothed law of friction creeps"), (own, "A law of one's own that")):
+        told = friction_section(friction_effects(changed(design, validation={"loads_Nm": (0.0,)})))
+        assert words in f"{told}"
+        assert ("creeps" in f"{told}") is (design is smooth)
+        assert ("stick-slip analysis: not made of a law" in f"{told}") is (design is own)
 
 
 def test_the_rule_of_the_position_takes_the_crossover_of_the_law_inside() -> None:

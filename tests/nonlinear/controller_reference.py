@@ -1,7 +1,7 @@
 """The controller of model.md sections 2 and 7 in plain Python, written from the equations alone."""
 
 from collections import deque
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from math import inf, log, sqrt, tan
 
 import numpy as np
@@ -150,7 +150,6 @@ class Controller:
 
     def __init__(self, design: Design) -> None:
         self.design, c = design, design.controller
-        self.sheet = replace(design, temperature=None).effective_motor  # what feed-forward is computed with
         self.Ts, self.k = c.period_s, 0
         self.n_v = c.velocity.every if c.velocity else 1
         self.n_p = c.position.every if c.position else self.n_v
@@ -210,7 +209,7 @@ class Controller:
         return self.limit_outer(direct + self.I)
 
     def torque_gain(self) -> float:
-        m = self.sheet
+        m = self.design.effective_motor
         if m.source_gain_Nm_V is not None:
             return m.source_gain_Nm_V
         return m.torque_constant_Nm_A / (1.0 if self.pi_c else m.resistance_ohm)
@@ -231,7 +230,7 @@ class Controller:
             self.i_max = min(self.i_max, limits.continuous_current_A)
 
     def tick(self, command: float, i: float, w: float, th: float, y: float) -> float:
-        c, limits, m = self.design.controller, self.design.limits, self.sheet
+        c, limits, m = self.design.controller, self.design.limits, self.design.effective_motor
         self.overload(i)
         if self.k % self.n_p == 0:
             r = self.profile(command)

@@ -231,15 +231,23 @@ def test_windows_and_step_figures_against_the_history() -> None:
                 e = np.exp(-2j * np.pi * frequency * harmonic * t)
                 expected = 2j * np.mean(x * e)
                 assert batch.phasor(name, harmonic, last)[0] == pytest.approx(expected, abs=1e-9)
-    target, kept = 0.01, Reducers(step_target_rad=0.01)
-    asked = Run(design=AMBER, command=commands.step(target), duration_s=0.2, reducers=kept)
-    step, history = simulate_many([asked]).step, simulate(AMBER, commands.step(target), 0.2)
-    y, t = history.output_angle_rad / target, history.time_s
+
+
+@pytest.mark.parametrize(
+    ("stages", "target"),
+    [({}, 0.01), ({"position": None}, 0.3), (TORQUE, 0.5)],
+    ids=["angle", "speed", "torque"],
+)
+def test_step_figures_are_of_what_the_command_orders(stages: dict[str, None], target: float) -> None:
+    design, kept = changed(AMBER, controller=stages), Reducers(step_target_rad=target)
+    asked = Run(design=design, command=commands.step(target), duration_s=0.2, reducers=kept)
+    step, history = simulate_many([asked]).step, simulate(design, commands.step(target), 0.2)
+    y, t = history.followed / target, history.time_s
     begin, end = np.interp([0.1, 0.9], y[: y.argmax()], t[: y.argmax()])
     assert step.rise_time_s[0] == pytest.approx(end - begin, rel=1e-9)
     assert step.overshoot_percent[0] == pytest.approx(max(100.0 * (y.max() - 1.0), 0.0), abs=1e-9)
-    outside = np.flatnonzero(np.abs(y - 1.0) > 0.02)
-    assert step.settling_time_s[0] == pytest.approx(t[outside[-1] + 1])
+    settled = np.append(t, np.nan)[np.flatnonzero(np.abs(y - 1.0) > 0.02)[-1] + 1]
+    assert step.settling_time_s[0] == pytest.approx(settled, nan_ok=True)
     assert step.final_ratio[0] == pytest.approx(y[-1], rel=1e-14)
 
 

@@ -77,3 +77,13 @@ def test_a_hot_winding_is_not_made_up_for() -> None:
     assert drive_gain(hot) == pytest.approx(expected, rel=1e-12)
     assert back_emf_Nms_rad(hot) == pytest.approx(now.torque_constant_Nm_A * left / (gain + R), rel=1e-12)
     assert drive_gain(cold) == pytest.approx(cold.effective_motor.torque_constant_Nm_A, rel=1e-12)
+
+
+def test_a_drive_whose_file_states_its_temperature_has_a_controller_set_for_it() -> None:
+    """All of the resistance fed forward: torque kM i_ref, of the design as it is written."""
+    design = controlled(
+        load_design("ilr33-amber"), current={"integral_time_s": None, "resistance_feedforward": 1.0}
+    )
+    warm = design.with_values({"temperature.winding": "90 degC"})
+    assert warm.effective_motor.resistance_ohm > design.effective_motor.resistance_ohm
+    assert drive_gain(warm) == pytest.approx(warm.effective_motor.torque_constant_Nm_A, rel=1e-12)
