@@ -4,6 +4,7 @@ import re
 import shutil
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -171,6 +172,41 @@ def test_what_benches_do_to_a_column_is_named(fault: str, words: str, columns: C
     if changed is None:
         record = record_of(record.time_s, **record.signals, torque=torque)
     assert re.search(words, _correlated(record)[1])
+
+
+@pytest.mark.parametrize("signals", [("angle",), ("speed",)])
+@pytest.mark.parametrize("rows", [slice(2000, 2500), slice(0, 4000)])
+def test_a_frozen_current_is_named(signals, rows: slice, columns: Columns) -> None:
+    current = columns["current"].copy()
+    current[rows] = current[rows][0]
+    record = _record(columns, *signals, "current", current=current)
+    (told,) = (one for one in check_record(DRIVE, record) if "frozen" in one.text)
+    count, first = len(current[rows]), rows.start + 1
+    assert told.passed is False
+    assert f"in {count} rows, from row {first} (" in told.text
+
+
+@pytest.mark.parametrize("command", [commands.step(0.02), commands.triangle(0.02, 1.0), commands.hold(0.0)])
+def test_a_current_that_stands_with_its_drive_is_not_frozen(command: Any) -> None:
+    """Without noise: it keeps its value at rest, off and at its limit, and turns back in none of them."""
+    run = simulate(DRIVE, command, 2.0)
+    moved = {"angle": run.motor_angle_rad, "speed": run.motor_speed_rad_s, "current": run.current_A}
+    off = {**moved, "current": np.zeros(len(run.time_s))}
+    limit = {**moved, "current": np.clip(run.current_A, -0.1, 0.1)}
+    for signals in (moved, off, limit):
+        record = record_of(run.time_s[::10], **{name: values[::10] for name, values in signals.items()})
+        assert not [one for one in check_record(DRIVE, record) if "frozen" in one.text]
+
+
+def test_a_slip_between_two_angles_is_no_other_ratio(columns: Columns) -> None:
+    """The motor's clamp slips by 5 rad within 0.1 s: the same reduction before and behind it."""
+    slipped = columns["angle"] + 5.0 * np.clip((columns["time"] - 2.0) / 0.1, 0.0, 1.0)
+    output = columns["angle"] / DRIVE.total_ratio
+    for angle, words in ((slipped, "the motor angle slips by 4.9"), (1.1 * columns["angle"], "is 1.1 times")):
+        record = record_of(columns["time"], angle=angle, output_angle=output, current=columns["current"])
+        (told,) = (one for one in check_record(DRIVE, record) if one.subject == "angle against output angle")
+        assert told.passed is False
+        assert words in told.text
 
 
 def test_a_following_error_that_torques_make_tells_no_clock() -> None:
