@@ -66,7 +66,7 @@ def test_json_and_files_and_a_linear_axis_in_metres(run, tmp_path) -> None:
 
 
 def test_ramps_and_slopes_are_read_in_their_own_units(run) -> None:
-    """6 m/min are 0.1 m/s, 10 N/mm hold back 10 N a millimetre; a length, N m/rad, a share are none of them."""
+    """6 m/min are 0.1 m/s, 10 N/mm hold back 10 N a millimetre; a length, N m/rad, a share are none."""
     _, rows = run("emps --command ramp --amplitude 6m/min --bias-rate 300mm/min --duration 0.05")
     assert rows["reference_m"][-1] == pytest.approx((0.1 + 0.005) * rows["time_s"][-1], rel=1e-12)
     _, rows = run("emps --amplitude 1mm --load-slope -10N/mm --duration 0.3")
