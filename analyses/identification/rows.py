@@ -88,6 +88,7 @@ def drive_of(design: Design, record: Record) -> tuple[Floats, str, str, bool]:
             told = f"kM (u - kE w)/R of the {words}, without the inductance"
             return np.asarray(constant / ohm * record[name]), name, told, True
     told = "no drive signal: force, current (kM), torque_reference, or voltage (a source gain, or kM and R)"
+    told += "; of a motor that is switched off a column of current 0"
     raise lacking(record, told)
 
 

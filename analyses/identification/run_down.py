@@ -45,22 +45,35 @@ def runs_down(design: Design, record: Record) -> bool:
 
 
 def switched_off(design: Design, record: Record) -> Record:
-    """The record; of a motion whose current is white noise that moves nothing (F-test), with none."""
+    """The record; of a motion whose current is white noise that moves nothing (F-test), with none.
+
+    Where the drive comes down to rest, also of noise about a level: a constant torque and the acceleration
+    do not tell inertia from friction, so that it is no more than an offset of either.
+    """
     if not np.any(current := record.signals.get("current", np.zeros(1))):
         return record
-    if too_short(record) or stands(design, record):
+    none = replace(record, signals={**record.signals, "current": np.zeros_like(current)})
+    if too_short(record) or stands(design, none):
         return record
     recipe = recipe_for(record)
     motion = motion_of(design, record, recipe)[0]
+    last = np.abs(motion.velocity)[-max(round(REST_TIME_S / period_of(record)), 6) :]
+    level, most = 0.0, float(np.max(np.abs(motion.velocity)))
+    if runs_down(design, none) and np.mean(last) < SLOW * most:
+        level = float(np.clip(np.mean(current), np.min(current), np.max(current)))  # of a constant itself
     table = np.column_stack([motion.acceleration, motion.velocity, np.sign(motion.velocity)])
-    rest = current - table @ scaled_lstsq(table, current)
+    noise = current - level
+    rest = noise - table @ scaled_lstsq(table, noise)
     least, free = float(rest @ rest), len(rest) - table.shape[1]
-    told = (float(current @ current) - least) / table.shape[1] / (least / free)
-    if not is_white(current, record, recipe) or variance_ratio.sf(told, table.shape[1], free) < NO_CHANCE:
+    told = (float(noise @ noise) - least) / table.shape[1] / (least / free) if least else 0.0
+    if not is_white(noise, record, recipe) or variance_ratio.sf(told, table.shape[1], free) < NO_CHANCE:
         return record
     note = "the current is noise about zero, and moves nothing: taken as none, a run-down"
-    none = {**record.signals, "current": np.zeros_like(current)}
-    return replace(record, signals=none, notes=(*record.notes, note))
+    if abs(level) > SURE * np.sqrt(np.mean(noise**2) / len(noise)):
+        note = f"the current is {level:.3g} A, at rest as well: taken as an offset of its sensor, a run-down"
+        if (gain := design.motor.torque_constant_Nm_A) is not None:
+            note += f"; as a torque, {gain * level:.3g} N m, it would be in the friction as an offset"
+    return replace(none, notes=(*record.notes, note))
 
 
 @dataclass(frozen=True, kw_only=True)

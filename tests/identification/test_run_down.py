@@ -34,11 +34,19 @@ def _decay(p: float, q: float, begin: float) -> tuple[np.ndarray, np.ndarray, np
 
 
 def _recorded(
-    rng: np.random.Generator, p: float, q: float, *, side: int = 1, noise: float = 1.0, current_A: float = 0.0
+    rng: np.random.Generator,
+    p: float,
+    q: float,
+    *,
+    side: int = 1,
+    noise: float = 1.0,
+    current_A: float = 0.0,
+    level_A: float = 0.0,
 ) -> Record:
     time, speed, _ = _decay(p, q, rng.uniform(250.0, 500.0))
     seen = side * speed + noise * rng.standard_normal(len(time))
-    return record_of(time, "off", speed=seen, current=current_A * rng.standard_normal(len(time)))
+    current = level_A + current_A * rng.standard_normal(len(time))
+    return record_of(time, "off", speed=seen, current=current)
 
 
 def _identified(*records: Record, fix: list[str] | None = None, **changes: float) -> BenchResult:
@@ -63,10 +71,19 @@ def test_intervals_of_the_ratios_hold_95_in_100(by: str) -> None:
     assert np.max(np.abs(off)) < 4.0
 
 
-@pytest.mark.parametrize("current_A", [0.0, 0.01])
-def test_friction_is_found_at_the_design_s_inertia_and_the_ratios_are_said(current_A: float) -> None:
+@pytest.mark.parametrize(
+    ("current_A", "level_A"), [(0.0, 0.0), (0.01, 0.0), (0.01, 0.02), (0.003, -0.05), (0.0, 0.02)]
+)
+def test_friction_is_found_at_the_design_s_inertia_and_the_ratios_are_said(
+    current_A: float, level_A: float
+) -> None:
+    """Of a sensor with an offset it was "no motion beyond noise", or passed with half of the friction."""
     p, q = VISCOUS / INERTIA, DRY / INERTIA
-    result = _identified(_recorded(np.random.default_rng(1), p, q, current_A=current_A))
+    seen = _recorded(np.random.default_rng(1), p, q, current_A=current_A, level_A=level_A)
+    result = _identified(seen)
+    assert any("offset of its sensor" in note for one in result.records for note in one.notes) == bool(
+        level_A
+    )
     model, kept = result.model, result.model.fixed["inertia"]
     assert model.names == ("viscous", "dry")
     for name, truth in (("viscous", VISCOUS), ("dry", DRY)):
