@@ -19,8 +19,15 @@ from analyses.records.differentiation import butterworth
 from analyses.records.driven_motion import ALIKE, ratio_of, turned_current, wrong_time, wrong_time_of_speed
 from analyses.records.factors import explaining, named_factor, with_factor
 from analyses.records.naming import LOADS, RATES
-from analyses.records.record import DISORDER, HELD, Record
-from analyses.records.single_rows import NORMAL, impossible_steps, named_rows, noise_bound
+from analyses.records.record import DISORDER, HELD, Record, stretches
+from analyses.records.single_rows import (
+    NORMAL,
+    count_of,
+    impossible_steps,
+    named_rows,
+    noise_bound,
+    place_in_file,
+)
 
 RATE_TOLERANCE = 0.02  # of speed over rate: above, no design is made; below, it widens the intervals
 NO_CHANCE = 1e-3  # level at which chance is rejected
@@ -98,7 +105,13 @@ def check_record(design: Design, record: Record) -> tuple[Finding, ...]:
     checks = (rate, _still, _time, _clock, _reduction, electrical, _sign, _load, _command, _supply)
     steps = _steps(design, record)  # a row that is lost at full speed looks like a jump
     steps = steps if steps and steps.passed is False else _jumps(design, as_read) or steps
-    found = (_rows(as_read), steps, *(check(design, record) for check in checks), *_limits(design, as_read))
+    found = (
+        _rows(as_read),
+        steps,
+        _frozen(design, as_read),
+        *(check(design, record) for check in checks),
+        *_limits(design, as_read),
+    )
     return tuple(result for result in found if result is not None)
 
 
@@ -364,8 +377,56 @@ def _reduction(design: Design, record: Record) -> Finding | None:
     passed = abs(ratio - 1.0) <= RATE_TOLERANCE + _twist_share(design, record)
     text = f"the motor angle is {ratio:.4g} times the output angle and the reduction"
     if not passed:
-        text = with_factor(text, ratio, {design.total_ratio: "the reduction, counted twice"})
+        other = design.total_ratio * b
+        slip = _slip(record, a - other, float(np.sum((a - ratio * other) ** 2)))
+        text = slip or with_factor(text, ratio, {design.total_ratio: "the reduction, counted twice"})
     return Finding(subject, passed, text)
+
+
+def _slip(record: Record, off: Floats, left: float) -> str:
+    """One slip of an angle that is ``off`` another, where it leaves less squared than is ``left`` without."""
+    rows = np.arange(1, len(off))
+    before = np.cumsum(off)[:-1]
+    taken = before**2 * len(off) / (rows * (len(off) - rows))
+    k = int(np.argmax(taken))
+    if float(off @ off) - taken[k] >= left:
+        return ""
+    by = -before[k] * len(off) / (rows[k] * (len(off) - rows[k]))
+    where = place_in_file(record, k + 1)
+    return f"the motor angle slips by {by:.3g} rad against the output angle, about {where}"
+
+
+def _frozen(design: Design, record: Record) -> Finding | None:
+    """A current that keeps a value longer than chance makes it, while the motion turns back.
+
+    Not 0, as of a power stage that is off, nor at either end of its range, where a limit holds it.
+    """
+    at = record.signals.get("current")
+    runs = [] if at is None or record.averaged > 1 else list(stretches(np.diff(at) == 0.0))
+    if at is None or not runs:
+        return None
+    start, stop = max(runs, key=lambda run: run[1] - run[0])
+    length, count = stop - start, len(at) - 1
+    repeats = sum(end - begin for begin, end in runs) - length
+    chance = count * ((repeats + 1.0) / (count - length + 2.0)) ** length  # Laplace's rule of succession
+    held = np.ptp(at) > 0.0 and at[start] in (at.min(), at.max())
+    if chance >= NO_CHANCE or at[start] == 0.0 or held or not _turns_back(design, record, start, stop + 1):
+        return None
+    told = f"the current is {at[start]:.4g} A in {length + 1} rows, from {place_in_file(record, start)} on"
+    return Finding("current from row to row", False, f"{told}, while the motion turns back: frozen?")
+
+
+def _turns_back(design: Design, record: Record, start: int, stop: int) -> bool:
+    """Whether a record moves to and fro within some rows, by more than its noise and counts."""
+    place, speed = place_of(design, record), record.signals.get(RATES[design.axis])
+    if place is not None:
+        part, bound = place[1][start:stop], 2.0 * noise_bound(place[1], SURE) + count_of(place[1])
+        ends = part[[0, -1]]
+        return bool(max(part.max() - ends.max(), ends.min() - part.min()) > bound)
+    if speed is None:
+        return False
+    bound = noise_bound(speed, SURE)
+    return bool(speed[start:stop].min() < -bound and speed[start:stop].max() > bound)
 
 
 def _twist_share(design: Design, record: Record) -> float:

@@ -76,7 +76,10 @@ class Sampler:
 
     def __post_init__(self) -> None:
         if not self.paths:
-            raise InputError("no parameter has a tolerance: give one in the design, or a file of samples")
+            how = 'resistance = { value = "1 ohm", tolerance = "10 %" }'
+            raise InputError(
+                f"no parameter has a tolerance: give one in the design ({how}), or a file of samples"
+            )
         if isinstance(self.seed, bool) or self.seed < 0:
             raise InputError(f"seed = {self.seed}: an integer from 0 on")
 

@@ -1,5 +1,8 @@
 """The running controller against its equations written plainly; limits alone: H1, H2, H3, anti-windup."""
 
+import copy
+import pickle
+from collections.abc import Callable
 from math import acos, asin, degrees, inf, radians
 
 import numpy as np
@@ -105,6 +108,20 @@ def test_every_number_has_a_kind_and_nothing_goes_on_from_notes_and_work_space()
 
 
 AMBER = load_design("ilr33-amber")
+
+
+@pytest.mark.parametrize("copied", [copy.deepcopy, lambda drive: pickle.loads(pickle.dumps(drive))])
+def test_a_copy_of_a_drive_goes_on_alone(copied: Callable[[Drive], Drive]) -> None:
+    drive = Drive(AMBER)
+    for k in range(20):
+        drive.step(command(k))
+    twin = copied(drive)
+    for k in range(20, 40):
+        drive.step(command(k))
+    assert twin.value("tick") == 20.0
+    for k in range(20, 40):
+        twin.step(command(k))
+    assert np.array_equal(drive.get(), twin.get())
 
 
 def ideal_drive(period_s: float, limits: model.Limits) -> model.Design:

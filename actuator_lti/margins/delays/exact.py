@@ -55,7 +55,7 @@ class Quasi:
 
     def __call__(self, s: acb) -> acb:
         """The value at s, an interval or a point, at the working precision of the first call."""
-        return sum((p(s) * (-s * tau).exp() for p, tau in self._balls), acb(0))
+        return sum((p(s) * (-s * tau).exp() if tau else p(s) for p, tau in self._balls), acb(0))
 
     @cached_property
     def _balls(self) -> list[tuple[acb_poly, arb]]:
