@@ -45,9 +45,10 @@ def recipe_for(record: Record, cutoff_hz: float | None = None, decimation: int |
     per cent; torques filtered as the position is. The record of the EMPS benchmark has the published recipe.
     """
     period = period_of(record)
-    if cutoff_hz is None and decimation is None and is_benchmark(record):
+    usual = min(100.0, 0.1 / period)
+    if cutoff_hz is None and decimation is None and is_benchmark(record) and usual == Recipe().cutoff_hz:
         return Recipe()
-    cutoff = min(100.0, 0.1 / period) if cutoff_hz is None else cutoff_hz
+    cutoff = usual if cutoff_hz is None else cutoff_hz
     if not cutoff > 0.0:
         raise InputError(f"cutoff = {cutoff:g} Hz: must be between 0 and {0.5 / period:g} Hz")
     factor = max(1, round(1.0 / (cutoff * period))) if decimation is None else decimation

@@ -439,6 +439,14 @@ def test_a_constant_force_beside_the_one_stated_is_said(added_N: float, emps_fil
     )
 
 
+def test_a_published_record_in_milliseconds_read_as_seconds_names_the_clock(emps_file: Path) -> None:
+    """It ended at a cut-off that nobody asked for: "must be between 0 and 0.5 Hz"."""
+    record = open_record(emps_file)
+    result = identify_bench(load_design("emps"), [replace(record, time_s=1e3 * record.time_s)])
+    assert not result.passed
+    assert "in the clock: factor 1000" in item_of(result, "size").reason
+
+
 def test_what_is_neither_met_nor_failed_says_why(columns: Columns, right) -> None:
     """50 mA of a current sensor: kM times that, neither met nor failed."""
     result = identify_bench(BASE, [_record({**columns, "current": columns["current"] + 0.05})])
