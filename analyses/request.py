@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, get_args, get_origin,
 if TYPE_CHECKING:
     from analyses.studies.engine import Engine
 
-Kind = Literal["plain", "output", "speed", "load", "command"]
+Kind = Literal["plain", "output", "speed", "load", "slope", "command", "rate"]
 UNITS = ("_rad_s", "_rad", "_hz", "_Nm", "_s", "_degC", "_V", "_A")
 
 
@@ -26,9 +26,11 @@ class Option:
     metavar: str = ""  # what stands for the value in the help; of a plain number its unit, "" for none
     _: KW_ONLY
     flag: str = ""  # the option, without dashes; the field's name without its unit where empty
-    # ``"output"``, ``"speed"``: of the output with its unit; ``"load"``: a load, with or without;
-    # ``"command"``: of the command of the outermost loop, with or without
+    # ``"output"``, ``"speed"``: of the output with its unit; ``"load"``, ``"slope"``: a load, or one over the
+    # output's angle, with or without; ``"command"``, ``"rate"``: of the command of the outermost loop, or of
+    # its rate, with or without
     kind: Kind = "plain"
+    ramps: bool = False  # whether --command ramp makes a rate of it
     # Whether it stands by its place, without a flag; it has to be given where it has no default
     argument: bool = False
 

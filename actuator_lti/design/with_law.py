@@ -88,6 +88,8 @@ def with_law(
     unit = {"inputs": ["error"], "D": [1.0]}  # whatever the law will be, the stage's period is this one's
     period_s = _staged(design, stage, table, unit).controller.period_of(stage)
     A, B, C, D, dt = _state_space(system)
+    if method is not None and continuous is not None:
+        raise InputError("continuous: allowed: without method, of which the continuous form is the system")
     if method is not None:
         continuous, (A, B, C, D), dt = (A, B, C, D), _sampled((A, B, C, D), dt, period_s, method), period_s
     elif dt is None or dt is True or dt == 0:

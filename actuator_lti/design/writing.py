@@ -65,7 +65,7 @@ def _changed(raw: Tree, old: Tree, new: Tree) -> Tree:
 
 def design_tree(design: Design) -> Tree:
     """The tree of plain values behind :func:`write_design`."""
-    design = _by_its_own_numbers(design)
+    design = by_its_own_numbers(design)
     head = {"name": design.name, "title": design.title, "axis": design.axis}
     head |= {key: getattr(design, key) for key in ("revision", "description") if getattr(design, key)}
     tree: Tree = {"design": head}
@@ -90,7 +90,7 @@ def design_tree(design: Design) -> Tree:
     return {key: value for key, value in tree.items() if value != []}  # an empty [supply] is one
 
 
-def _by_its_own_numbers(design: Design) -> Design:
+def by_its_own_numbers(design: Design) -> Design:
     """The same drive as a file can say it: feed-forward as shares of its own numbers, not the nominal's."""
     if design.nominal is None:
         return design
@@ -297,7 +297,7 @@ def _label(item: Tree, number: int) -> str:
 
 def design_hash(design: Design) -> str:
     """SHA-256 (hex) of all values in SI to 12 digits, tolerances, requirements; not of titles or sources."""
-    design = _by_its_own_numbers(as_design(design))
+    design = by_its_own_numbers(as_design(design))
     parts = [section for section in SECTIONS if not section.parent]
     top = {part.place for part in parts if not part.asked or getattr(design, part.place) is not None}
     content = {key: _canonical(getattr(design, key)) for key in ("axis", *sorted(top))}

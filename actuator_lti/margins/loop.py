@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from scipy.linalg.lapack import dgebal
 
+from actuator_lti.errors import NumericalError
 from actuator_lti.margins.given import Given, given_of, unwarped
 from actuator_lti.systems.resolvent import LARGE, states_at
 from actuator_lti.types import Complex, Real
@@ -229,7 +230,10 @@ def _from_coefficients(num: Real, den: Real, period_s: float | None, warp: bool)
             size[0, n + 1 - num.size :], size[1] = np.abs(num / warped_den[0]), np.abs(den / warped_den[0])
             return replace(loop, period_s=period_s, in_z_size=size)
     coefficients = np.zeros((2, n + 1))
-    coefficients[0, n + 1 - num.size :], coefficients[1] = num / den[0], den / den[0]
+    with np.errstate(over="ignore"):
+        coefficients[0, n + 1 - num.size :], coefficients[1] = num / den[0], den / den[0]
+    if not np.isfinite(coefficients).all():
+        raise NumericalError("the loop overflows double precision: rescale its coefficients")
     (d, *above), below = coefficients[0].tolist(), coefficients[1, 1:]
     A = np.eye(n, k=-1)
     A[:1] = -below

@@ -8,6 +8,7 @@ import numpy as np
 from actuator_lti.design import read_design_text, with_values, write_design
 from actuator_lti.design.asked import FrozenMap
 from actuator_lti.design.model import Design, Tolerance
+from actuator_lti.design.writing import by_its_own_numbers
 from actuator_lti.errors import InputError
 from actuator_lti.types import Progress
 from analyses.correlation.driving import command_of
@@ -79,7 +80,7 @@ def identify_bench(
     settings = Settings() if settings is None else settings
     limit = settings.residual_limit / 100.0
     used, unseen = (tuple(prepared(record) for record in these) for these in (records, validation))
-    plain = with_values(design, fixed_values(design, settings.fix))
+    plain = replace(with_values(design, fixed_values(design, settings.fix)), nominal=design)
     usual = settings.cutoff_hz is None and settings.decimation is None
     recipe = None if usual else recipe_for(used[0], settings.cutoff_hz, settings.decimation)
     sought = Sought(design, plain, settings, recipe)
@@ -128,7 +129,7 @@ def identify_bench(
         model=model,
         residual_tests=tests,
         refined=refined,
-        design=made,
+        design=by_its_own_numbers(made),
         unmade=unmade,
         resimulated=again,
         items=tuple(items),

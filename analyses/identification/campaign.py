@@ -189,10 +189,26 @@ def campaign_items(
         size_item(design, [one for one in compared if one], kept_constants=False, loaded=True),
         residual_item(fit.relative_residual, limit),
         *kept_items(fit, held),
+        *_fit_items(result),
     ]
     if simulated is not None:
         items.append(simulated_item("the runs", simulated, limit, "steady current, simulated"))
     return tuple(items)
+
+
+def _fit_items(result: CampaignResult) -> Iterator[Item]:
+    """Runs that are no part of the others and yet in the fit, and a law that tells unseen runs better."""
+    if kept := sorted(
+        (one for one in result.fit.outliers if not one.set_aside), key=lambda one: -abs(one.standardised)
+    ):
+        off, names = kept[0], ", ".join(one.run for one in kept)
+        why = f"run {off.run} is {abs(off.standardised):.3g} standard deviations off, limit {off.limit:.3g}"
+        why += f"; in the fit, and far off: {names}" if len(kept) > 1 else ", and in the fit"
+        why += '; outliers = "set-aside" in [campaign] leaves such runs out'
+        yield Item.unproven("outliers", "Every run is one of the others", why)
+    if result.laws is not None and result.laws.best != "plain":
+        why = f"{result.laws.best}: tells unseen runs better, so that the truth need not lie in the intervals"
+        yield Item.unproven("friction-law", "Friction law of the fit is that of the runs", why)
 
 
 def steady_error(design: Design, points: Sequence[SteadyPoint], *, progress: Progress = None) -> float | None:

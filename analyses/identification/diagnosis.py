@@ -121,13 +121,16 @@ def _with_lags(model: JointModel, lags: Sequence[tuple[Lag, float]]) -> JointMod
     """The model with what lags that are not sure move, and filters that were taken back as delays.
 
     Of a filter of first order that is sampled every T the impulse response has the variance L (L + T), L its
-    lag; of a delay none.
+    lag; of a delay none. All records may come from one recorder, whose lags move the values as one does.
     """
-    for lag, period_s in lags:
-        if len(lag.per_s) == len(model.names):
-            filtered = abs(lag.seconds) * (abs(lag.seconds) + period_s) * lag.per_s2
-            model = model.wider(filtered if lag.is_sure else lag.within_s * lag.per_s)
-    return model
+    moved = [
+        abs(lag.seconds) * (abs(lag.seconds) + period_s) * lag.per_s2
+        if lag.is_sure
+        else lag.within_s * lag.per_s
+        for lag, period_s in lags
+        if len(lag.per_s) == len(model.names)
+    ]
+    return model.wider(np.mean(moved, axis=0)) if moved else model
 
 
 def _followed(start: Design, record: Record, simulated: Mapping[str, Floats]) -> Followed | None:

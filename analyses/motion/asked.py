@@ -37,8 +37,9 @@ class Asked:
         float,
         Option(
             'Peak for the outermost loop, such as "5 deg" or 5: deg at the output (mm on a linear '
-            "axis), deg/s (mm/s) of a speed drive, A, V; a ramp: per second; 1.",
+            'axis), deg/s (mm/s) of a speed drive, A, V; a ramp: per second, "5 deg/s"; 1.',
             kind="command",
+            ramps=True,
         ),
     ] = 1.0
     frequency: Annotated[float, Option("Frequency; the first of a chirp or a set; 1.", "Hz")] = 1.0
@@ -54,10 +55,17 @@ class Asked:
     duration: Annotated[float | None, Option("Duration; 1, or that of a stepped sine or a record.", "s")] = (
         None
     )
-    bias_rate: Annotated[float, Option("Ramp added underneath: the amplitude's unit per second; 0.")] = 0.0
+    bias_rate: Annotated[
+        float, Option("Ramp added underneath: the amplitude's unit per second; 0.", kind="rate")
+    ] = 0.0
     load: Annotated[float, LOAD] = 0.0
     load_slope: Annotated[
-        float, Option("Load torque per rad of output angle, added to the design's; 0.", "N*m/rad")
+        float,
+        Option(
+            "Load torque per rad of output angle (linear axis: N per m), added to the design's; 0.",
+            "SLOPE",
+            kind="slope",
+        ),
     ] = 0.0
     load_file: Annotated[
         Path | None, Option("Load torque over time: s (of the run, or the record's), N m.", "CSV")

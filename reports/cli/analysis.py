@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from actuator_lti.asked.verdict import Verdict
-from analyses.request import OnMachines, Option, flag, is_number, options
+from analyses.request import Kind, OnMachines, Option, flag, is_number, options
 from analyses.studies.study_asked import study_with
 from reports.analyses import Analysis
 from reports.cli import options as common
@@ -124,7 +124,8 @@ def answer(
     for name, (kind, option) in options(one.request).items():
         of, value = f"--{option.flag or flag(name)}", chosen[name]
         plain = option.kind == "plain" and not is_number(kind)
-        values[name] = value if plain else common.read_quantity(of, value, option.kind, drive, option.metavar)
+        way: Kind = "rate" if option.ramps and chosen.get("command") == "ramp" else option.kind
+        values[name] = value if plain else common.read_quantity(of, value, way, drive, option.metavar)
         if option.kind == "load" and values[name]:
             beyond += beyond_largest(drive, of, values[name])
     if one.written and (as_json or out is not None):

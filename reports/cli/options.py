@@ -56,7 +56,12 @@ _AT_OUTPUT = {
     ("speed", "linear"): ("m/s", 'a speed such as "0.2 m/s"'),
     ("load", "rotary"): ("N*m", 'a torque such as "4 N*m"'),
     ("load", "linear"): ("N", 'a force such as "40 N"'),
+    ("slope", "rotary"): ("N*m/rad", 'a slope such as "5 N*m/rad"'),
+    ("slope", "linear"): ("N/m", 'a slope such as "5 N/m"'),
 }
+
+
+_AMPERES = {"A": "limits.peak_current", "A/s": "limits.current_rate"}  # which are read as a file's
 
 
 def read_quantity(option: str, words: str | None, kind: Kind, drive: Design, unit: str = "") -> float | None:
@@ -67,29 +72,33 @@ def read_quantity(option: str, words: str | None, kind: Kind, drive: Design, uni
     Amperes of an AC motor are read as in its file; a plain number is of the model's.
     """
     from actuator_lti.design.field import Structure
+    from actuator_lti.design.fields import FIELDS
     from actuator_lti.design.stated import Frame
     from actuator_lti.design.units import parse_limit
 
     if words is None:
         return None
     bare: float | None = None
-    if kind in ("output", "speed", "load"):
+    if kind in ("output", "speed", "load", "slope"):
         unit, allowed = _AT_OUTPUT[kind, drive.axis]
     else:
-        if kind == "command":
+        if kind in ("command", "rate"):
             from nonlinear.runs.trajectory import COMMAND_UNITS
 
             unit, _ = COMMAND_UNITS[drive.axis, drive.controller.outermost]
+            if kind == "rate":
+                unit += "^2" if unit.endswith("/s") else "/s"
         allowed = f'"5 {unit}", or 5 in {unit}' if unit else 'a number such as 0.5 or "50 %"'
-        if unit == "A" and drive.motor.constants != "dc":
-            allowed = '"5 A rms", "5 A peak", or 5 in A dc'
+        if unit in _AMPERES and drive.motor.constants != "dc":
+            rms, peak, dc = (unit.replace("A", f"A {which}") for which in ("rms", "peak", "dc"))
+            allowed = f'"5 {rms}", "5 {peak}", or 5 in {dc}'
     with suppress(ValueError):
         bare = None if kind in ("output", "speed") else float(words)
     if bare is not None and not isfinite(bare):
         raise InputError(f"{option} {words}: must be a finite number")
     try:
-        if bare is None and unit == "A":
-            return Frame(Structure.of(drive), drive.motor.constants).limit(words, unit)
+        if bare is None and unit in _AMPERES:
+            return Frame(Structure.of(drive), drive.motor.constants).quantity(words, FIELDS[_AMPERES[unit]])
         return parse_limit(words, unit or "1") if bare is None else bare
     except InputError as error:
         reason = error.message.partition("allowed:")[0].rstrip("; ") or "the motor's amperes are dc"

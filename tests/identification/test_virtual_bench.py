@@ -8,7 +8,7 @@ import pytest
 
 from actuator_lti.design import load_design, read_design_text, write_design
 from actuator_lti.design.model import Design
-from analyses.identification.campaign import CampaignResult, identify_campaign
+from analyses.identification.campaign import CampaignResult, campaign_items, identify_campaign
 from analyses.identification.surface import PATHS, contributions, fit_surface
 from analyses.identification.to_design import design_with_fit
 from analyses.records.campaign_file import Campaign, Join, RunEntry, load_campaign
@@ -138,22 +138,34 @@ def _mirrored(run: TrueRun) -> TrueRun:
     return replace(run, **reverse) if int(run.id) % 2 else run
 
 
+def _unproven(design: Design, result: CampaignResult) -> dict[str, str]:
+    """What a campaign does not prove, and why."""
+    return {one.id: one.reason for one in campaign_items(design, result, None, 0.2) if one.passed is None}
+
+
 def test_a_richer_law_is_found_and_an_outlier_named(design, runs) -> None:
     """3 % more friction in reverse, which the offset of the current measurement (2 mA) cannot explain."""
     bent = [replace(r, current_A=r.current_A + 2e-7 * r.speed_rad_s**2) for r in runs]
     more = [replace(r, current_A=r.current_A * (1.03 if int(r.id) % 2 else 1.0)) for r in runs]
     for law, made, seed in (("quadratic", bent, 3), ("per direction", map(_mirrored, more), 8)):
-        assert identify_campaign(_imported(tuple(made), seed), design).laws.best == law
+        found = identify_campaign(_imported(tuple(made), seed), design)
+        assert found.laws.best == law
+        assert _unproven(design, found)["friction-law"].startswith(f"{law}: tells unseen runs better")
     result = identify_campaign(_imported(tuple(_mirrored(run) for run in runs), 8), design)
     assert {point.direction for point in result.fit.points} == {-1, 1}
+    assert set(_unproven(design, result)) == {"kept-torque_constant"}
     assert np.all(np.abs(result.fit.values - TABLE_1) <= result.fit.half_widths)
     per_direction = next(score for score in result.laws.scores if score.name == "per direction")
     assert per_direction.possible
     assert not per_direction.warranted
     strange = tuple(replace(r, current_A=r.current_A * (1.05 if r.id == "30" else 1.0)) for r in runs)
     imported = _imported(strange, 5)
-    kept = identify_campaign(imported, design, richer=False).fit
+    found = identify_campaign(imported, design, richer=False)
+    kept = found.fit
     assert [outlier.run for outlier in kept.outliers] == ["30"]
+    assert "run 30 is" in _unproven(design, found)["outliers"]
+    spared = replace(found, fit=fit_surface(kept.points, INSTRUMENTS.bounds, 5.9e-3, outliers="set-aside"))
+    assert "outliers" not in _unproven(design, spared)
     aside = fit_surface(kept.points, INSTRUMENTS.bounds, 5.9e-3, outliers="set-aside")
     assert len(aside.points) == 53
     assert aside.outliers[0].set_aside

@@ -257,6 +257,7 @@ def test_what_is_no_law_is_refused_in_words(tmp_path: Path) -> None:
     assert "B = other sizes: allowed: 1 x 2, with 2 inputs" in made(unit, ["error", "speed"])
     assert 'inputs = "omega": allowed' in made(unit, ["error", "omega"])
     assert "continuous: sampled, dt = 0.0001" in made(unit, continuous=unit)
+    assert "continuous: allowed: without method" in made(unit[:4], method="tustin", continuous=unit[:4])
     assert "one row, a law has one output" in made(([[0.5]], [[1.0]], [[1.0], [1.0]], [[0.0], [0.0]], T))
     assert "as many rows as columns" in made(([[0.5, 1.0]], [[1.0]], [[1.0]], [[0.0]], T))
     assert "real numbers" in made(([["a"]], [[1.0]], [[1.0]], [[0.0]], T))

@@ -10,11 +10,12 @@ from margin_families import clusters_and_near_cancellations, deadbeat_and_zeros_
 from margin_truth import difference, towards_the_border, truth_of
 
 from actuator_lti import load_design
-from actuator_lti.bandwidth import peaks
+from actuator_lti.bandwidth import closed_loop_bandwidth, peaks
 from actuator_lti.batch import Population, linear_figures
 from actuator_lti.errors import InputError, NumericalError
 from actuator_lti.loops import assemble_loops
 from actuator_lti.margins import Agreement, StabilityMargins, stability_margins
+from actuator_lti.step import step_figures
 from actuator_lti.systems.delay_system import DelaySystem
 from actuator_lti.systems.phase import unwrapped_phase_deg
 from tests.changed import changed
@@ -80,6 +81,13 @@ NO_BANDS = ((1,), 5, ("a", "b"), "ab", "12", (2, 1), (1, 2, 3), (None, 1), (math
 def test_refusals_say_why(loop: control.LTI, asked: dict[str, object], message: str) -> None:
     with pytest.raises(InputError, match=message):
         stability_margins(loop, **asked)
+
+
+def test_a_loop_beyond_double_precision_is_refused_without_a_warning() -> None:
+    loop = control.tf([1e308], [1e-308, 1.0, 0.0])
+    for figures in (stability_margins, closed_loop_bandwidth, step_figures):
+        with pytest.raises(NumericalError, match="overflows double precision: rescale its coefficients"):
+            figures(loop)
 
 
 def test_gain_of_one_everywhere_has_no_phase_margin() -> None:

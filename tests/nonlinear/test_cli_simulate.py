@@ -65,6 +65,16 @@ def test_json_and_files_and_a_linear_axis_in_metres(run, tmp_path) -> None:
     assert not [name for name in names if "Nm" in name or "rad" in name]
 
 
+def test_ramps_and_slopes_are_read_in_their_own_units(run) -> None:
+    """6 m/min are 0.1 m/s, 10 N/mm hold back 10 N a millimetre; a length, N m/rad, a share are none."""
+    _, rows = run("emps --command ramp --amplitude 6m/min --bias-rate 300mm/min --duration 0.05")
+    assert rows["reference_m"][-1] == pytest.approx((0.1 + 0.005) * rows["time_s"][-1], rel=1e-12)
+    _, rows = run("emps --amplitude 1mm --load-slope -10N/mm --duration 0.3")
+    assert rows["load_force_N"][1:] == pytest.approx(-1e4 * rows["output_angle_m"][1:], abs=1e-9)
+    for words in ("--command ramp --amplitude 5mm", "--load-slope 10N*m/rad", "--bias-rate 50%"):
+        assert "wrong dimension" in run.refused(f"emps {words} --duration 0.01")
+
+
 def test_a_record_is_a_command_from_its_start_and_a_log_of_events_is_held(run, tmp_path) -> None:
     times = [0.0, 0.1, 0.2, 0.5, 0.6]
     path = table(tmp_path / "record.csv", "t,angle", times, times)

@@ -2,6 +2,7 @@
 
 import math
 
+import control
 import numpy as np
 import pytest
 
@@ -147,17 +148,35 @@ def test_rest_and_describing_function_change_the_slope_as_the_loops_do(point, ex
     assert mine == pytest.approx(truth.phase_margin_deg, rel=1e-6)
 
 
-@pytest.mark.parametrize(("above", "longest"), [
-    (1e-2, None), (1.0, None), (1e3, None), (1e5, None), (1.0, 2000)
-])  # fmt: skip
-def test_a_step_is_followed_for_as_long_as_its_resonance_rings(above, longest, monkeypatch):
-    """A resonance of 1 % damping, up to 140 dB above the gain at zero frequency; or for the longest time."""
-    import control
+S = control.tf("s")
 
+
+def ringing(above: float) -> control.StateSpace:
+    """A resonance of 1 % damping, up to 140 dB above the gain at zero frequency."""
+    return control.c2d(control.ss(50 * above * S / (S**2 + S + 2500) + 1 / (S + 1)), 1e-3)
+
+
+PAIR = control.c2d(control.ss(1 / (0.05 * S + 1) + 0.3 * S / (S**2 + 0.4 * S + 4)), 1e-2)
+
+
+def every_other(slow: float) -> control.StateSpace:
+    """A slow mode of z^2, as of a drive with two updates: both roots of its pole."""
+    part = control.tf([0.5], [1.0, -0.5], 1e-3) * (1.0 - slow) + control.tf(
+        [slow * 1e-3], [1.0, -0.999], 1e-3
+    )
+    return control.ss(
+        control.tf(*(np.kron(each[0][0], [1.0, 0.0])[:-1] for each in (part.num, part.den)), 1e-3)
+    )
+
+
+@pytest.mark.parametrize(("system", "longest", "known"), [
+    *((ringing(above), None, True) for above in (1e-2, 1.0, 1e3, 1e5)), (ringing(1.0), 2000, False),
+    (PAIR, 1500, True), (every_other(0.05), 4000, True), (every_other(-0.05), 4000, True),
+])  # fmt: skip
+def test_a_step_is_followed_for_as_long_as_it_may_leave_its_band(system, longest, known, monkeypatch):
+    """As a resonance rings, for the longest time, or until the slowest poles are too small."""
     from actuator_lti.batch import _figures, _linalg, _step
 
-    s = control.tf("s")
-    system = control.c2d(control.ss(50 * above * s / (s**2 + s + 2500) + 1 / (s + 1)), 1e-3)
     A, B, C = (np.asarray(part) for part in (system.A, system.B, system.C))
     n, p = len(A), np.linalg.eigvals(system.A)
     row = np.full(_figures.COLUMNS, np.nan)
@@ -167,11 +186,10 @@ def test_a_step_is_followed_for_as_long_as_its_resonance_rings(above, longest, m
     _linalg.hessenberg(n, *loop, np.zeros(n))
     monkeypatch.setattr(_step, "LONGEST", longest or _step.LONGEST)
     _step.step_figures(n, *loop, np.nan, poles, row, *spaces)
-    truth = step_figures(system)
-    known = math.nan if longest else 1.0
-    settling, overshoot = known * truth.settling_time_s / 1e-3, known * truth.overshoot_percent
+    truth, known = step_figures(system), 1.0 if known else math.nan
+    settling, overshoot = known * truth.settling_time_s / system.dt, known * truth.overshoot_percent
     assert row[_figures.SETTLING] == pytest.approx(settling, abs=1e-6, nan_ok=True)
-    assert row[_figures.RISE] == pytest.approx(truth.rise_time_s / 1e-3, abs=1e-6)
+    assert row[_figures.RISE] == pytest.approx(truth.rise_time_s / system.dt, abs=1e-6)
     assert row[_figures.OVERSHOOT] == pytest.approx(overshoot, rel=1e-7, nan_ok=True)
 
 
