@@ -235,7 +235,7 @@ class Design:
     @property
     def dc_of_sheet(self) -> dict[str, float]:
         """R, L, kM and kE of the equivalent DC motor over those of the data sheet, by attribute."""
-        return _EQUIVALENT[self.motor.constants]
+        return dict(zip(_OF_SHEET, _EQUIVALENT[self.motor.constants], strict=True))
 
     @cached_property
     def controller_model(self) -> "Design":
@@ -267,20 +267,12 @@ class Design:
         return replace(motor, **same, constants="dc")
 
 
-def _equivalent(torque: float, voltage: float, impedance: float) -> dict[str, float]:
-    return {
-        "resistance_ohm": impedance,
-        "inductance_H": impedance,
-        "torque_constant_Nm_A": torque,
-        "back_emf_constant_Vs_rad": voltage,
-    }
-
-
 # from the data sheet to the equivalent DC motor
-_EQUIVALENT: dict[MotorConstants, dict[str, float]] = {
-    "dc": _equivalent(1.0, 1.0, 1.0),
-    "rms-line": _equivalent(1.0 / DC_PER_A["rms-line"], sqrt(2.0), 1.0),
-    "peak-phase": _equivalent(1.0 / DC_PER_A["peak-phase"], sqrt(3.0), 2.0),
+_OF_SHEET = ("resistance_ohm", "inductance_H", "torque_constant_Nm_A", "back_emf_constant_Vs_rad")
+_EQUIVALENT: dict[MotorConstants, tuple[float, ...]] = {
+    "dc": (1.0, 1.0, 1.0, 1.0),
+    "rms-line": (1.0, 1.0, 1.0 / DC_PER_A["rms-line"], sqrt(2.0)),
+    "peak-phase": (2.0, 2.0, 1.0 / DC_PER_A["peak-phase"], sqrt(3.0)),
 }
 
 

@@ -273,7 +273,7 @@ def ends_alike(design: Design, settlings: Iterable[Settling], *lengths: int) -> 
             assert verdict == one.rest.verdict, (one, ticks)
 
 
-@pytest.mark.parametrize("seed", [2, 4, 9, 13, 20, 35, 43, 44])
+@pytest.mark.parametrize("seed", [4, 9, 13, 20, 35, 43, 44])
 def test_all_who_ask_get_one_answer(seed: int, monkeypatch: pytest.MonkeyPatch) -> None:
     """`cycles`, `validate`, `failures` before any, `simulate` after two lengths; the words of the report."""
     design = stable_position_drive(seed)
