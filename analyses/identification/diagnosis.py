@@ -121,12 +121,13 @@ def _with_lags(model: JointModel, lags: Sequence[tuple[Lag, float]]) -> JointMod
     """The model with what lags that are not sure move, and filters that were taken back as delays.
 
     Of a filter of first order that is sampled every T the impulse response has the variance L (L + T), L its
-    lag; of a delay none. All records may come from one recorder, whose lags move the values as one does.
+    lag; of a delay none. The square of a lag that is not sure is expected to be what was found less that of
+    its error: of records without one next to nothing. All records may come from one recorder, whose lags move the values as one does.
     """
     moved = [
         abs(lag.seconds) * (abs(lag.seconds) + period_s) * lag.per_s2
         if lag.is_sure
-        else lag.within_s * lag.per_s
+        else np.sqrt(max(lag.seconds**2 - lag.standard_error**2, 0.0)) * lag.per_s
         for lag, period_s in lags
         if len(lag.per_s) == len(model.names)
     ]
