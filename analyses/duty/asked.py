@@ -90,14 +90,9 @@ class Asked:
         stage = design.controller.outermost
         size: float | None = getattr(self, SIZES.get(stage, ""), None)
         if size is None:
-            name, value = next(
-                (name, one) for name in SIZES.values() if (one := getattr(self, name)) is not None
-            )
-            wrong = place + key_of(name) if place else name
-            raise InputError(
-                f"{wrong} = {value:.6g}: this drive's command is a {stage}; "
-                f"allowed: {place}{key_of(SIZES.get(stage, 'none'))}"
-            )
+            name = next(name for name in SIZES.values() if getattr(self, name) is not None)
+            wrong, right = place + key_of(name) if place else name, place + key_of(SIZES.get(stage, "none"))
+            raise InputError(f"{wrong}: this drive's command is a {stage}; allowed: {right}")
         return size
 
     @classmethod

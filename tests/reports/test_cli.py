@@ -97,7 +97,7 @@ def test_margins_on_the_terminal_name_every_loop(form: str, cli) -> None:
     ("montecarlo --samples 1e3", "'--samples': allowed: a whole number, such as 1000"),
     ("montecarlo --at-least x", "--at-least 'x': a number and a unit are wanted; allowed: a number such as"),
     ("duty --share '4 kg'", '"kg" is the unit of a mass; allowed: a number such as 0.5 or "50 %"'),
-    ("duty --set 'duty.current=5 A'", "duty.current = 5: this drive's command is a position; allowed: duty."),
+    ("duty --set 'duty.current=5 A'", "duty.current: this drive's command is a position; allowed: duty."),
     ("failures --set 'failure.speed=5 rpm'", "failure.speed = 0.523599: allowed of a drive commanded"),
     ("duty --frequency '4 s'", '"s" is the unit of a time; allowed: "5 Hz", or 5 in Hz'),
     ("--time-limit x designs", "'--time-limit': allowed: a number, such as 0.5, without its unit"),

@@ -132,8 +132,8 @@ def test_a_sine_of_speed_and_one_of_current() -> None:
 
 
 @pytest.mark.parametrize(("design", "wrong", "words"), [
-    (SPINDLE, {"amplitude_rad": 0.1}, "= 0.1: this drive's command is a velocity; allowed: speed"),
-    (TORQUE, {"speed_rad_s": 0.1}, "= 0.1: this drive's command is a current; allowed: current"),
+    (SPINDLE, {"amplitude_rad": 0.1}, ": this drive's command is a velocity; allowed: speed"),
+    (TORQUE, {"speed_rad_s": 0.1}, ": this drive's command is a current; allowed: current"),
     (SPINDLE, {"speed_rad_s": 0.1, "current_A": 1.0}, "allowed: one of amplitude, speed, current"),
     (SPINDLE, {"ramp_s": 0.6, "frequency_hz": 1.0}, "allowed: 0 to half a period, 0.5 s"),
     (SPINDLE, {"frequency_hz": 2e4}, "20000 Hz: must be below the Nyquist frequency of the velocity loop"),
