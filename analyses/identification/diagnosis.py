@@ -122,7 +122,8 @@ def _with_lags(model: JointModel, lags: Sequence[tuple[Lag, float]]) -> JointMod
 
     Of a filter of first order that is sampled every T the impulse response has the variance L (L + T), L its
     lag; of a delay none. The square of a lag that is not sure is expected to be what was found less that of
-    its error: of records without one next to nothing. All records may come from one recorder, whose lags move the values as one does.
+    its error: of records without one next to nothing. All records may come from one recorder, whose lags move
+    the values as one does.
     """
     moved = [
         abs(lag.seconds) * (abs(lag.seconds) + period_s) * lag.per_s2

@@ -9,6 +9,7 @@ the report as well.
 
 import os
 import platform
+import re
 import sys
 import tempfile
 from collections.abc import Callable, Mapping
@@ -98,12 +99,14 @@ def _run(call: Callable[[], object], options: Callable[[], Mapping[str, str]]) -
 
 def _by_option(error: InputError, known: Callable[[], Mapping[str, str]]) -> str:
     """Name the option where the message begins with the Python argument behind it: ``duration_s = ...``."""
-    name, equals, rest = str(error).partition(" = ")
-    if error.where is not None or not equals or not name.isidentifier():
-        return str(error)
+    words = str(error)
+    begun = re.match(r"([^\W\d]\w*)( = |: )", words)
+    if error.where is not None or begun is None:
+        return words
+    name, rest = begun[1], words[begun.end() :]
     options, short = known(), name.removesuffix("_Nm").removesuffix("_s").removesuffix("_rad")
     option = options.get(name) or options.get(short)
-    return f"{option} {rest}" if option else str(error)
+    return f"{option}{begun[2].removesuffix('= ')}{rest}" if option else words
 
 
 def _say(line: str, status: int) -> int:
