@@ -41,6 +41,7 @@ class Measured:
     source: str  # where the radius comes from
     open_loop: MeasuredResponse  # the measured L: itself, T/(1 - T) or 1/S - 1
     open_model: np.ndarray
+    per_second: np.ndarray  # the model's L were the numbers of the frequencies rad/s and not Hz
     # The model's L on a grid of its own, from a tenth of the least frequency to the largest that it has
     curve_hz: Floats
     curve: np.ndarray
@@ -65,10 +66,12 @@ class Measured:
     def nearer(self) -> tuple[str, float] | None:
         """L, T or S of the model, where another one is less than half as far off, and how far in dB (rms).
 
-        Or what was measured with the other sign, ``-`` in front.
+        Or what was measured with the other sign, ``-`` in front, with a phase whose lag is above 0, ``*``
+        behind it, or at frequencies in rad/s.
         """
         models = _closed(self.open_model)
-        models[f"-{self.of}"] = -models[self.of]
+        models |= {f"-{self.of}": -models[self.of], f"{self.of}*": models[self.of].conj()}
+        models[f"{self.of} in rad/s"] = _closed(self.per_second)[self.of]
         apart = {of: np.sqrt(np.mean(np.abs(np.log(self.measured / one)) ** 2)) for of, one in models.items()}
         best = min(apart, key=lambda of: apart[of])
         decibel = float(20.0 / np.log(10.0) * apart[best])
@@ -124,7 +127,11 @@ def measured_over(loops: Loops, source: Any, place: str = "", averages: int | No
         told = f"no two frequencies below half that of the sampling of the {name} loop"
         raise InputError(f"{read.name}: {told}")
     omega, values = 2.0 * np.pi * read.frequency_hz[below], read.response[below]
-    points = 1j * omega if loop.period_s is None else np.exp(1j * omega * loop.period_s)
+
+    def model_at(omega: np.ndarray) -> np.ndarray:
+        points = 1j * omega if loop.period_s is None else np.exp(1j * omega * loop.period_s)
+        return np.asarray(loop.plain_open(points)).reshape(-1)
+
     read = replace(read, response=values, deviation=read.deviation[below], radius=read.radius[below])
     size = np.abs(values)
     found = MeasuredResponse(omega, values, size * read.radius, loop.period_s, read.noise)
@@ -135,7 +142,7 @@ def measured_over(loops: Loops, source: Any, place: str = "", averages: int | No
     size = np.abs(opened.response)  # where it is 0 a circle says nothing
     radius = np.multiply(size, opened.radius, out=np.zeros(omega.size), where=size > 0.0)
     data = replace(found, frdata=opened.response, radius=radius)
-    L = np.asarray(loop.plain_open(points)).reshape(-1)
+    L = model_at(omega)
     top = 10.0 * read.frequency_hz[-1] if loop.period_s is None else 0.5 / loop.period_s
     grid = np.geomspace(0.1 * read.frequency_hz[0], top, CURVE_POINTS)
     margins, note = None, ""
@@ -145,7 +152,7 @@ def measured_over(loops: Loops, source: Any, place: str = "", averages: int | No
         note = error.message
     return Measured(
         name=read.name, loop=name, of=of, frequency_hz=omega / (2.0 * np.pi), measured=values,
-        model=_closed(L)[of], open_loop=data, open_model=L,
+        model=_closed(L)[of], open_loop=data, open_model=L, per_second=model_at(read.frequency_hz[below]),
         radius=np.asarray(found.radius, dtype=np.float64), source=found.source,
         curve_hz=grid, curve=response_at(loop.plain_open, 2.0 * np.pi * grid),
         margins=margins, note=note, beyond=int((~below).sum()), left_out=read.left_out,

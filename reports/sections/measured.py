@@ -21,7 +21,7 @@ def words(one: Measured) -> str:
     like = ""
     if one.nearer:
         of, off = one.nearer
-        asked = f"was it measured of {one.loop}:{of}" if of in WHAT else "was it measured with the other sign"
+        asked = f"was it measured of {one.loop}:{of}" if of in WHAT else ASKED[of.removeprefix(one.of)[:1]]
         like = f" It is nearer to {of} of the model, {off:.2f} dB rms: {asked}?"
     beyond = f" {one.beyond} points above half the sampling frequency are left out." if one.beyond else ""
     left = f" {one.left_out} rows without numbers or at 0 Hz are left out." if one.left_out else ""
@@ -29,6 +29,11 @@ def words(one: Measured) -> str:
     return f"{one.name} over the {_place(one)}. {told}.{like}{beyond}{left}{read} {one.note}".strip()
 
 
+ASKED = {
+    "-": "was it measured with the other sign",
+    "*": "is its phase turned round, a lag above 0",
+    " ": "are its frequencies in rad/s",
+}
 WHAT = {"L": "open {}", "T": "closed {}", "S": "sensitivity of the {}"}
 
 

@@ -185,6 +185,19 @@ def test_the_other_sign_is_named() -> None:
     assert "nearer to -L of the model, 0.42 dB rms: was it measured with the other sign?" in words(one)
 
 
+def test_frequencies_in_rad_s_and_a_phase_turned_round_are_named() -> None:
+    """Taken as Hz where a heading says no unit; a lag may be counted from 0 up."""
+    truth, at = bench("velocity", gain=1.05), LOOPS.velocity
+    turned = measured_over(LOOPS, Response(truth.frdata.ravel().conj(), truth.omega), "velocity")
+    assert turned.nearer == ("L*", pytest.approx(20.0 * np.log10(1.05), rel=1e-6))
+    assert "nearer to L* of the model, 0.42 dB rms: is its phase turned round" in words(turned)
+    omega = 2.0 * np.pi * HERTZ[HERTZ < 100.0]  # rad/s, whose numbers are read as Hz
+    T = at.plain_open(np.exp(1j * omega * at.period_s)).reshape(-1)
+    slow = measured_over(LOOPS, Response(T / (1.0 + T), 2.0 * np.pi * omega), "velocity:T")
+    assert slow.nearer == ("T in rad/s", pytest.approx(0.0, abs=1e-9))
+    assert "are its frequencies in rad/s?" in words(slow)
+
+
 def test_a_coherence_of_few_averages_is_as_wide_as_its_quantile_says(tmp_path) -> None:
     """Of two averages: F(2, 2) is exceeded by 99 in 1 of 100 cases, |e|^2 = 99 |L|^2 (1 - g2)/g2."""
     truth = bench("velocity", gain=1.0)
