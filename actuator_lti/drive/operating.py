@@ -55,10 +55,11 @@ class Operating:
 
     def checked(self, design: Design) -> Operating:
         """The same, refused where the design has no such operating point."""
-        if self.point in ("driving", "driven", "gap") and design.coupling is None:
-            raise InputError(f"operating_point = {self.point!r}: the design has no coupling")
-        if self.point == "gap" and not np.any(design.coupling.play_rad):
-            raise InputError("operating_point = 'gap': the coupling has no play")
+        if self.point in ("driving", "driven", "gap"):
+            if design.coupling is None:
+                raise InputError(f"operating_point = {self.point!r}: the design has no coupling")
+            if self.point == "gap" and not np.any(design.coupling.play_rad):
+                raise InputError("operating_point = 'gap': the coupling has no play")
         if self.rotor == "locked" and not design.motor.has_electrical_dynamics:
             raise InputError("rotor = 'locked': the design has no current, its torque is an ideal source")
         return self

@@ -210,6 +210,8 @@ def test_operating_points_of_the_friction() -> None:
     ({"design": emps(), "rotor": "locked"}, "locked"),
     ({"design": amber(encoder=Encoder(speed="tracking"))}, "bandwidth"),
     ({"operating_point": "driving"}, "no coupling"),
+    ({"design": load_design("ilr33-amber-compliant").with_values({"coupling.play": 0.0}),
+      "operating_point": "gap"}, "no play"),
     ({"inner_loops": "half"}, "inner_loops"),
     ({"form": "discrete"}, "^form = 'discrete': must be one of sampled, continuous, ideal$"),
     ({"operating_point": "moving"}, "operating_point = 'moving'"),
