@@ -13,7 +13,7 @@ from loop_designs import amber, controlled, ctms_position, drive_d, drive_e, emp
 from scipy.integrate import solve_ivp
 from test_stacked import FILTERS, everything
 
-from actuator_lti import DelaySystem, InputError, assemble_loops, delay_budget, stability_margins
+from actuator_lti import DelaySystem, InputError, assemble_loops, delay_budget, load_design, stability_margins
 from actuator_lti.design.model import Design, Encoder, Filter, Friction, Limits, Load, PositionLoop
 from actuator_lti.drive.blocks import biquad
 from actuator_lti.drive.operating import Operating, slope_at
