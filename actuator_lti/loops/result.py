@@ -42,6 +42,7 @@ class Loop:
     ``periodic``: whether faster ticks inside slower loops make the loop periodically time-varying: then S and
     T are the fundamental responses of the exact loop and L = T/S, see `actuator_lti.loops.periodic`.
     ``rotor``: "free" or "locked"; with a locked one there is a current loop alone.
+    ``at_law``: whether it is the loop of a stage, cut at what a law of one's own gives.
     """
 
     name: str
@@ -54,11 +55,7 @@ class Loop:
     unit_out: str
     periodic: bool = False
     rotor: RotorState = "free"
-
-    @property
-    def at_law(self) -> bool:
-        """Whether it is the loop of a stage, cut at what a law of one's own gives."""
-        return self.plain_open.source == self.break_point and not self.name.startswith("at ")
+    at_law: bool = False
 
     @cached_property
     def open_loop(self) -> Any:
@@ -122,7 +119,8 @@ def loop_of(
         plain_open=named(parts[0], f"{label}_open_loop", error, measured),
         plain_closed=named(parts[1], f"{label}_closed_loop", "reference", measured),
         plain_sensitivity=named(parts[2], f"{label}_sensitivity", "reference", error), period_s=period_s,
-        unit_in=unit, unit_out=unit, periodic=periodic, rotor=wired.operating.rotor
+        unit_in=unit, unit_out=unit, periodic=periodic, rotor=wired.operating.rotor,
+        at_law=wired.has_own_law(place),
     )  # fmt: skip
 
 
