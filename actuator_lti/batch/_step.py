@@ -36,7 +36,7 @@ def step_figures(n, a, b, c, lead, poles, row, state, after):
     imaginary = poles[3 * n + slowest]
     turn = _turn(n, poles, radius)
     tail = turn == 1.0 and imaginary == 0.0 and alone < min(inside, float(LONGEST))
-    look = alone
+    look = max(alone, turn)  # never where others than these are left
     above = 0.0
     off = 1.0
     ticks = int(alone) if tail else LONGEST

@@ -237,7 +237,7 @@ class Design:
         """R, L, kM and kE of the equivalent DC motor over those of the data sheet, by attribute."""
         return dict(zip(_OF_SHEET, _EQUIVALENT[self.motor.constants], strict=True))
 
-    @cached_property
+    @property
     def controller_model(self) -> "Design":
         """The drive whose J, kM, R and kE feed-forward computes with: the nominal one, as its file has it."""
         return self.nominal or self

@@ -156,22 +156,29 @@ def ringing(above: float) -> control.StateSpace:
     return control.c2d(control.ss(50 * above * S / (S**2 + S + 2500) + 1 / (S + 1)), 1e-3)
 
 
-PAIR = control.c2d(control.ss(1 / (0.05 * S + 1) + 0.3 * S / (S**2 + 0.4 * S + 4)), 1e-2)
+def held_twice(part: control.TransferFunction) -> control.StateSpace:
+    """In z^2, as of a drive with two updates: both roots of every pole."""
+    return control.ss(
+        control.tf(*(np.kron(each[0][0], [1.0, 0.0])[:-1] for each in (part.num, part.den)), part.dt)
+    )
 
 
-def every_other(slow: float) -> control.StateSpace:
-    """A slow mode of z^2, as of a drive with two updates: both roots of its pole."""
-    part = control.tf([0.5], [1.0, -0.5], 1e-3) * (1.0 - slow) + control.tf(
+def slow_mode(slow: float) -> control.TransferFunction:
+    return control.tf([0.5], [1.0, -0.5], 1e-3) * (1.0 - slow) + control.tf(
         [slow * 1e-3], [1.0, -0.999], 1e-3
     )
-    return control.ss(
-        control.tf(*(np.kron(each[0][0], [1.0, 0.0])[:-1] for each in (part.num, part.den)), 1e-3)
-    )
+
+
+def slow_pair(w: float) -> control.TransferFunction:
+    """One that passes zero about when it is alone, at some w."""
+    return control.tf(control.c2d(control.ss(1 / (0.05 * S + 1) + 0.3 * S / (S**2 + 0.4 * S + w**2)), 1e-2))
 
 
 @pytest.mark.parametrize(("system", "longest", "known"), [
     *((ringing(above), None, True) for above in (1e-2, 1.0, 1e3, 1e5)), (ringing(1.0), 2000, False),
-    (PAIR, 1500, True), (every_other(0.05), 4000, True), (every_other(-0.05), 4000, True),
+    (control.ss(slow_pair(2.0)), 1500, True),
+    *((held_twice(slow_mode(slow)), 4000, True) for slow in (0.05, -0.05)),
+    *((held_twice(slow_pair(w)), None, True) for w in (2.3, 2.5, 2.6)),
 ])  # fmt: skip
 def test_a_step_is_followed_for_as_long_as_it_may_leave_its_band(system, longest, known, monkeypatch):
     """As a resonance rings, for the longest time, or until the slowest poles are too small."""
