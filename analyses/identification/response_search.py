@@ -66,6 +66,7 @@ class Search:
     turn: Floats
     box: Floats  # of the coordinates, shape (2, p)
     ends: Floats  # of the values
+    most: Floats  # of a step of each: a slope over the computing delay is that within its tick
     unit: float  # deviation of what is left of the response
 
     @classmethod
@@ -81,7 +82,8 @@ class Search:
         """The search of some values beside others, within what their keys allow."""
         every, n = np.array((*names, *kept)), len(names)
         scale, ends = box_of(start, (*names, *kept))
-        ends[1, every == "control.computing_delay"] = MOST_TICKS * start.controller.period_s
+        late, tick_s = every == "control.computing_delay", start.controller.period_s
+        ends[1, late] = MOST_TICKS * tick_s
         own = np.array([parameter_value(start, key) for key in kept])
         std = own * [own_share(start, key) for key in kept]
         size, turn = np.linalg.eigh(np.outer(std, std) * correlation_of(start, kept))
@@ -98,6 +100,7 @@ class Search:
             turn=block_diag(np.diag(scale[:n]), turn * np.sqrt(np.maximum(size, 0.0))),
             box=box,
             ends=ends,
+            most=np.where(late, tick_s / scale, np.inf),
             unit=unit,
         )
 
@@ -171,4 +174,4 @@ class Search:
         moved = self.off(np.clip(here.x + BEND * step, *self.box)[None])[0]
         bend[free] = -solve @ (moved - here.rest - BEND * here.slopes @ step) / BEND**2 / size[free]
         bent = np.linalg.norm(bend * size) < 0.4 * np.linalg.norm(step * size)  # else no series in it
-        return step + bend if bent else step
+        return np.clip(step + bend if bent else step, -self.most, self.most)
