@@ -75,7 +75,9 @@ TABLE_ROWS = Bound("rows of a command, load or sample file", 5_000_000, "eight m
 MAT_BYTES = Bound("of a .mat file", 1 << 28, "read whole into memory", unit="bytes")
 MAT_VALUES = Bound("numbers of a .mat or Parquet file, unpacked", 50_000_000,
     "400 MB as floats; a compressed file of a megabyte can hold a thousand times its size")
-MAT_DIMENSIONS = Bound("dimensions of an array in a .mat file", 32, "numpy holds no more")
+MAT_MEMORY = Bound("of memory while a .mat file is read", 2_000_000_000, "five times what it may hold",
+    unit="bytes")
+MAT_SECONDS = Bound("to read a .mat file", 60, "five times as long as the largest takes", unit="s")
 CAMPAIGN_RUNS = Bound("runs of a campaign", 20_000, "54 are a week at the bench", asked_by="[[run]]")
 
 # ---- simulation ------------------------------------------------------------------------------------------

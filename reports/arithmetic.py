@@ -9,8 +9,6 @@ import platform
 import sys
 from collections.abc import Mapping
 
-ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
-
 
 def same_order() -> Mapping[str, str]:
     """Settings under which linear algebra adds in the same order on every machine of a kind.

@@ -8,7 +8,6 @@ import base64
 import hashlib
 import itertools
 import json
-import re
 from collections.abc import Mapping
 from functools import cache
 from os import PathLike
@@ -27,7 +26,7 @@ from reports.glossary import meaning
 from reports.numbers import MISSING, show, significant
 from reports.scripts import asset, bundled
 from reports.verdict_summary import role, verdict_lines, why
-from reports.visible import visible
+from reports.visible import LINE_END, visible
 
 LONG_TABLE = 13  # rows; longer tables fold
 KICKERS = {"report": "Loop analysis report"}
@@ -87,8 +86,7 @@ def render(template: str, *, style: str = "", code: str = "", **context: Any) ->
 
 
 def _breakable(name: str) -> Markup:
-    """A long name, which a line may end in behind its dots and equals signs, but not within a number."""
-    return Markup(re.sub(r"=|\.(?=[a-z])", r"\g<0><wbr>", str(escape(name))))
+    return Markup(LINE_END.sub(r"\g<0><wbr>", str(escape(name))))
 
 
 @cache

@@ -19,7 +19,7 @@ from reports.document import column, figures, judged, section, shown_fact, table
 from reports.html import KICKERS, show_signed
 from reports.numbers import show
 from reports.verdict_summary import role, verdict_lines, why
-from reports.visible import visible
+from reports.visible import LINE_END, visible
 
 TEMPLATE = Path(__file__).resolve().parent / "templates" / "pdf" / "report.typ"
 MAX_BYTES = 64_000_000
@@ -202,8 +202,14 @@ def _glance(block: Mapping[str, Any]) -> Tree:
 
 def _table(block: Mapping[str, Any]) -> Tree:
     columns: Sequence[Mapping[str, Any]] = block["columns"]
-    texts = [{"label": clean(c["label"], 120), "unit": clean(c["unit"], 30)} for c in columns]
-    heads = [{**text, "align": c["align"]} for text, c in zip(texts, columns, strict=True)]
+    heads = [
+        {
+            "label": LINE_END.sub("\\g<0>\u200b", clean(c["label"], 120)),
+            "unit": clean(c["unit"], 30),
+            "align": c["align"],
+        }
+        for c in columns
+    ]
     rows = []
     for row in block["rows"]:
         cells = [_cell(row.get(c["key"]), c["format"]) for c in columns]

@@ -9,6 +9,8 @@ DIRECTION = "\u061c\u200e\u200f\u202a-\u202e\u2066-\u2069"
 """Marks that turn the direction of reading (Unicode's Bidi_Control), as a range of a regular expression."""
 
 _DIRECTION = re.compile(f"[{DIRECTION}]")
+LINE_END = re.compile(r"=|\.(?=[a-z])")
+"""What a line may end behind in a long name: its dots and equals signs, but not within a number."""
 
 
 def visible(text: str) -> str:

@@ -16,7 +16,7 @@ from actuator_lti.drive.operating import Operating, OperatingPoint, pushes_away
 from actuator_lti.drive.wiring import Drive, present, wire
 from actuator_lti.errors import InputError
 from actuator_lti.loops.periodic import fundamental, shown
-from actuator_lti.loops.sampled import fundamental_path, stage_blocks
+from actuator_lti.loops.sampled import answer, fundamental_path, stage_blocks
 from actuator_lti.loops.tick import Block, TickProgram
 
 _CHUNK = 256
@@ -40,7 +40,8 @@ class LinearFigures:
     Definitions are those of `actuator_lti.stability_margins`, `actuator_lti.bandwidth` and
     `actuator_lti.step`. A design whose loop is unstable keeps its crossovers; its closed-loop figures
     are NaN, its delay margin is 0.
-    Closed-loop figures of the position loop are from command to output, feed-forward included.
+    Closed-loop figures of the position loop are from command to output, feed-forward included; of a stage
+    with a law of one's own from its command to what it measures.
     """
 
     loops: tuple[str, ...]  # that the structure has
@@ -189,7 +190,7 @@ def _fill(
     for stage in stages:
         rows, time_figures = np.full((len(chosen), out.shape[2]), np.nan), stage in timed
         rows[:, [fig.GAIN_CROSSOVERS, fig.PHASE_CROSSOVERS]] = 0.0
-        lead, response = _command_path(wired) if stage == "position" else (0.0, None)
+        lead, response = _command_path(wired, stage)
         blocks = stage_blocks(wired, stage)
         _figures_of(fundamental(blocks), lead, time_figures and response is None, rows)
         for k in np.flatnonzero(np.isnan(rows[:, fig.STABLE]) & (len(blocks) > 1)):
@@ -215,11 +216,13 @@ def _figures_of(block: Block, lead: Any, time_figures: bool, rows: np.ndarray) -
     many_loops(A, B, C, poles, leads, time_figures, rows)
 
 
-def _command_path(wired: Drive) -> tuple[Any, Block | None]:
-    """What stands between command and position loop: a lead k_ff/(Kv T), or else the whole response.
+def _command_path(wired: Drive, stage: str) -> tuple[Any, Block | None]:
+    """What stands between command and loop: a lead k_ff/(Kv T) of the position's, or else the whole response.
 
     With a P controller that feeds back the output itself, T (1 + lead (1 - 1/z)) is that response.
     """
+    if stage != "position":
+        return 0.0, answer(wired, stage) if wired.answers_apart(stage) else None
     law, T = wired.design.controller.position_loop, wired.period_s("position")
     more = (law.derivative_time_s, law.acceleration_feedforward, wired.design.command.filter_time_s)
     plain = law.law is None and law.integral_time_s is None and not any(map(present, more))

@@ -11,7 +11,7 @@ from actuator_lti.design.field import BIG
 from actuator_lti.design.law import balance
 from actuator_lti.design.mistakes import nearest
 from actuator_lti.errors import InputError
-from actuator_lti.files.mat5 import read_mat5
+from actuator_lti.files.matlab import read_mat
 from actuator_lti.files.reading import Tree, decode, parse_json, read_bytes, shown, shown_path
 
 PARTS = ("A", "B", "C", "D")
@@ -59,7 +59,7 @@ def read_law(path: Path) -> Tree:
 
 def _from_mat(data: bytes) -> Tree:
     """What a file holds by name, fields of a structure in a table of its name; None: what cannot be read."""
-    content, held = read_mat5(data), Tree()
+    content, held = read_mat(data), Tree()
     every = {**dict.fromkeys(content.passed_over), **content.texts, **content.complexes, **content.arrays}
     for name, values in every.items():
         table, _, field = name.rpartition(".")

@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 
 ERRORS = {"current": "e_i", "velocity": "e_w", "position": "e_th"}
 MEASURED = {"current": "i", "velocity": "w_meas", "position": "th"}
+BEHIND_FILTER = "command"  # the command of the outermost stage that runs, as it takes it
 LAW_OUTPUT = "law"  # what a law of one's own gives, before feed-forward and limits
 COMMANDS = {"voltage": "u", "current": "i_ref", "velocity": "w_ref", "position": "th_ref"}
 
@@ -72,6 +73,10 @@ class Drive:
         own = self.design.controller.own_law
         return own is not None and own[0] == stage and stage in self.stages
 
+    def answers_apart(self, stage: str) -> bool:
+        """Whether L/(1 + L) need not be how an inner stage answers its command: its law may take more."""
+        return stage != "position" and self.has_own_law(stage)
+
     def around(self, place: str) -> tuple[str, str]:
         """Signals behind and in front of where the loop of a stage, or at a break point, is broken."""
         if place in self.stages and not self.has_own_law(place):
@@ -92,6 +97,10 @@ class Drive:
         if place == "position":
             return ERRORS[place], "output", self.ratio
         return ERRORS[place], MEASURED[place], 1.0
+
+    def command_of(self, stage: str) -> tuple[str, str, float]:
+        """The same of how an inner stage answers its command, behind the filter that this may have."""
+        return BEHIND_FILTER, MEASURED[stage], 1.0
 
     def period_s(self, stage: str) -> Any:
         return self.interval[stage] * self.tick_s

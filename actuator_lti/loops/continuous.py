@@ -92,13 +92,13 @@ def finished(system: PlainDelaySystem, name: str, source: str, signal: str) -> A
 
 
 def open_loop(
-    wired: Drive, place: str, delays: frozenset[str], opened: tuple[str, ...] = ()
+    wired: Drive, place: str, delays: frozenset[str], opened: tuple[str, ...] = (), *, answer: bool = False
 ) -> PlainDelaySystem:
     """The open loop of a stage at its own error, inner loops closed (unless opened), outer ones absent.
 
-    Or that at a break point with all other loops closed.
+    Or that at a break point with all other loops closed; or how the stage answers its command.
     """
-    cut, signal, scale = wired.cut_of(place)
+    cut, signal, scale = wired.command_of(place) if answer else wired.cut_of(place)
     outer = place if place in wired.stages else wired.outermost
     return joined(systems(FlowProgram(wired, outer, cut, opened, delays).flow(), "cut", signal, scale))
 
@@ -106,7 +106,10 @@ def open_loop(
 def loop(wired: Drive, place: str, delays: frozenset[str], opened: tuple[str, ...] = ()) -> Loop:
     """The same with its closed loop and its sensitivity."""
     system = open_loop(wired, place, delays, opened)
-    return loop_of(wired, place, (system, system.feedback(), static(np.eye(1)).feedback(system)), finished)
+    parts, own = (system, system.feedback(), static(np.eye(1)).feedback(system)), None
+    if wired.answers_apart(place):
+        own = open_loop(wired, place, delays, opened, answer=True)
+    return loop_of(wired, place, parts, own, finished)
 
 
 def _whole(wired: Drive, delays: frozenset[str]) -> Flow:

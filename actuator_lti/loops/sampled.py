@@ -4,7 +4,7 @@ from functools import partial
 
 import numpy as np
 
-from actuator_lti.drive.wiring import COMMANDS, MEASURED, Drive
+from actuator_lti.drive.wiring import COMMANDS, Drive
 from actuator_lti.loops.limiters import LimiterPath, Response, limiter_paths
 from actuator_lti.loops.periodic import cyclic, fundamental, phase_blocks, point_blocks, shown
 from actuator_lti.loops.result import Loop, loop_of
@@ -34,7 +34,8 @@ def loop(wired: Drive, place: str, opened: tuple[str, ...] = ()) -> Loop:
     block = fundamental(shown(blocks)).shown()
     period = wired.period_s(place if is_stage else wired.producer(place))
     parts, named = (block, block.feedback(), block.sensitivity()), partial(_system, period_s=period)
-    return loop_of(wired, place, parts, named, period, periodic=len(blocks) > 1)
+    own = answer(wired, place, opened).shown() if wired.answers_apart(place) else None
+    return loop_of(wired, place, parts, own, named, period, periodic=len(blocks) > 1)
 
 
 def reference_to_output(wired: Drive) -> PlainSystem:
@@ -44,11 +45,10 @@ def reference_to_output(wired: Drive) -> PlainSystem:
     return _system(block.shown(), "reference_to_output", source, label, every * wired.tick_s)
 
 
-def answer(wired: Drive, stage: str) -> PlainSystem:
-    """Command of a stage to what it measures, inner loops closed and outer ones absent, at its instants."""
-    program, source, signal = TickProgram(wired, stage), COMMANDS[stage], MEASURED[stage]
-    block = fundamental_path(program, wired.interval[stage], "ref", signal)
-    return _system(block.shown(), f"{stage}_answer", source, signal, wired.period_s(stage))
+def answer(wired: Drive, stage: str, opened: tuple[str, ...] = ()) -> Block:
+    """Command of a stage behind its filter to what it measures, as `stage_blocks` has the other loops."""
+    cut, signal, _ = wired.command_of(stage)
+    return fundamental_path(TickProgram(wired, stage, cut, opened), wired.interval[stage], "cut", signal)
 
 
 def fundamental_path(program: TickProgram, every: int, source: str, signal: str) -> Block:

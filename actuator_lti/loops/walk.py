@@ -19,7 +19,7 @@ from actuator_lti.design.law import Law, Matrices, twist_of
 from actuator_lti.design.plant import torque_per_command
 from actuator_lti.drive import blocks
 from actuator_lti.drive.blocks import Block, Realisation
-from actuator_lti.drive.wiring import ERRORS, LAW_OUTPUT, Drive, present
+from actuator_lti.drive.wiring import BEHIND_FILTER, ERRORS, LAW_OUTPUT, Drive, present
 from actuator_lti.loops.rows import Row, total
 
 INPUTS = ("ref", "torque", "moment", "cut")
@@ -35,9 +35,9 @@ class Program:
     drive: Drive
     # Outermost stage that runs; its reference is the input ``ref`` (of the position at the output shaft)
     outer: str
-    # A break point (``u``, ``i_ref``, ``w_ref``, ``output``), an error (``e_i``, ``e_w``, ``e_th``) or what a
-    # law of one's own gives (``law``) that is replaced by the input ``cut`` where it is updated; what arrives
-    # is the signal of that name
+    # A break point (``u``, ``i_ref``, ``w_ref``, ``output``), an error (``e_i``, ``e_w``, ``e_th``), what a
+    # law of one's own gives (``law``) or the command behind its filter (``command``) that is replaced by the
+    # input ``cut`` where it is updated; what arrives is the signal of that name
     cut: str | None = None
     opened: tuple[str, ...] = ()  # stages whose feedback is taken away; their controllers stay in the path
 
@@ -172,9 +172,9 @@ class Walk(ABC):
     def command(self) -> Row:
         """The reference of the outermost stage, behind the command's filter where it is the drive's own."""
         value, block = Row.of("ref"), self.drive.command_filter
-        if block is None or self.program.outer != self.drive.outermost:
-            return value
-        return self.apply("command", block, value)
+        if block is not None and self.program.outer == self.drive.outermost:
+            value = self.apply("command", block, value)
+        return self.at_cut(BEHIND_FILTER, value)
 
     def position(self, reference: Row) -> Row:
         """P, PI or PID on the angle, and the feed-forward of speed and acceleration."""

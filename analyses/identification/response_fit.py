@@ -45,9 +45,8 @@ class _Side:
     bound: float  # the end of the interval where the deviation is below its level there
 
     def fitted(self, begin: Point, at: float) -> tuple[Floats, float]:
-        """The others fitted again, and the deviation over its level; at the farthest only which is more."""
-        goal = self.best.cost + self.level**2 if at == self.most else 0.0
-        there = self.search.least(begin, enough=ROUGH, hold=self.k, goal=goal)
+        """The others fitted again, and the deviation over its level."""
+        there = self.search.least(begin, enough=ROUGH, hold=self.k)
         if there.cost < self.best.cost - CLOSE * self.level**2:
             if self.search.rank(there) > self.search.rank(self.best):  # it grows: the interval ends before
                 return there.x, np.inf

@@ -8,6 +8,7 @@ from functools import cached_property
 
 import numpy as np
 from scipy.linalg import block_diag
+from scipy.optimize import least_squares
 
 from actuator_lti.design import parameter_value
 from actuator_lti.design.model import Design
@@ -21,10 +22,8 @@ NEVER_ZERO = "motor.rotor_inertia", "load.inertia", "coupling.stiffness"  # by t
 STEP = 1e-5  # share of a value for its differences: those of a sharp resonance curve at 1e-3 already
 FURTHEST = 1e6  # factor of the design's inertia or stiffness at which a search ends
 MOST_TICKS = 100.0  # of computing delay: a design has no more
-FINE, CRAWL = 1e-6, 1e-4  # of what is left: what a step has to promise to save, and to save, for another
+FINE = 1e-6  # of what is left: what a step has to save for another
 ROUNDS = 100  # steps of a fit
-MOST_DAMPED = 1e10  # of a step: one that is damped more is none
-BEND = 0.1  # part of a step after which the bend of the response along it is looked at
 
 
 @dataclass(frozen=True)
@@ -66,7 +65,6 @@ class Search:
     turn: Floats
     box: Floats  # of the coordinates, shape (2, p)
     ends: Floats  # of the values
-    most: Floats  # of a step of each: a slope over the computing delay is that within its tick
     unit: float  # deviation of what is left of the response
 
     @classmethod
@@ -82,8 +80,7 @@ class Search:
         """The search of some values beside others, within what their keys allow."""
         every, n = np.array((*names, *kept)), len(names)
         scale, ends = box_of(start, (*names, *kept))
-        late, tick_s = every == "control.computing_delay", start.controller.period_s
-        ends[1, late] = MOST_TICKS * tick_s
+        ends[1, every == "control.computing_delay"] = MOST_TICKS * start.controller.period_s
         own = np.array([parameter_value(start, key) for key in kept])
         std = own * [own_share(start, key) for key in kept]
         size, turn = np.linalg.eigh(np.outer(std, std) * correlation_of(start, kept))
@@ -100,7 +97,6 @@ class Search:
             turn=block_diag(np.diag(scale[:n]), turn * np.sqrt(np.maximum(size, 0.0))),
             box=box,
             ends=ends,
-            most=np.where(late, tick_s / scale, np.inf),
             unit=unit,
         )
 
@@ -135,43 +131,27 @@ class Search:
         change = np.subtract(*np.split(np.array(moved), 2))
         return Point(x, here, (change / np.diag(up - down)[:, None]).T)
 
-    def least(
-        self, begin: Point, *, enough: float = FINE, hold: int | None = None, goal: float = 0.0
-    ) -> Point:
+    def least(self, begin: Point, *, enough: float = FINE, hold: int | None = None) -> Point:
         """The least sum of squares near a point, in the box, one coordinate of which may be held.
 
-        Levenberg and Marquardt's steps, bent as the response is along them (Transtrum and Sethna,
-        arXiv:1201.5885). It ends below a ``goal``, or where a step would save less than a part ``enough`` of
-        what is left: the values are off by as little of their errors (Bates and Watts, Technometrics 23,
-        1981).
+        By a dogleg in the box (scipy). It ends where a step saves less than a part ``enough`` of what is
+        left: the values are off by as little of their errors (Bates and Watts, Technometrics 23, 1981).
         """
-        here, damp, size = begin, 1e-3, np.zeros(len(begin.x))
-        for _ in range(ROUNDS):
-            downhill = -here.slopes.T @ here.rest
-            free = np.where(downhill > 0.0, here.x < self.box[1], here.x > self.box[0]) & (downhill != 0.0)
-            free[[] if hold is None else hold] = False
-            size = np.maximum(size, np.linalg.norm(here.slopes, axis=0))
-            slopes = here.slopes[:, free] / size[free]
-            saved = float(np.sum((np.linalg.qr(slopes)[0].T @ here.rest) ** 2))
-            while here.cost > goal and saved > enough * (here.cost - saved) and damp < MOST_DAMPED:
-                there = self.at(here.x + self._step(here, slopes, size, free, damp))
-                if there.cost < here.cost and np.isfinite(there.slopes).all():
-                    break
-                damp *= 10.0
-            else:
-                return here
-            saved, here, damp = here.cost - there.cost, there, 0.1 * damp
-            if saved < max(enough, CRAWL) * here.cost:
-                break
-        return here
+        free = np.arange(len(begin.x)) != hold
 
-    def _step(self, here: Point, slopes: Floats, size: Floats, free: Mask, damp: float) -> Floats:
-        """One step of the free coordinates, whose slopes are over their sizes."""
-        table = np.vstack([slopes, np.sqrt(damp) * np.eye(slopes.shape[1])])
-        solve = np.linalg.pinv(table)[:, : len(here.rest)]
-        step, bend = np.zeros(len(size)), np.zeros(len(size))
-        step[free] = -solve @ here.rest / size[free]
-        moved = self.off(np.clip(here.x + BEND * step, *self.box)[None])[0]
-        bend[free] = -solve @ (moved - here.rest - BEND * here.slopes @ step) / BEND**2 / size[free]
-        bent = np.linalg.norm(bend * size) < 0.4 * np.linalg.norm(step * size)  # else no series in it
-        return np.clip(step + bend if bent else step, -self.most, self.most)
+        def at(part: Floats) -> Floats:
+            x = begin.x.copy()
+            x[free] = part
+            return x
+
+        def slopes(part: Floats) -> Floats:
+            return self.at(at(part)).slopes[:, free]
+
+        if not (free.any() and np.isfinite(begin.cost) and np.isfinite(begin.slopes).all()):
+            return begin
+        options = {"method": "dogbox", "x_scale": "jac", "ftol": enough, "xtol": None, "gtol": None}
+        found = least_squares(
+            lambda part: self.off(at(part)[None])[0],
+            begin.x[free], slopes, self.box[:, free], max_nfev=ROUNDS, **options,
+        )  # fmt: skip
+        return self.at(at(found.x))

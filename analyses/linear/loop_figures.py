@@ -12,7 +12,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
-from math import pi, sqrt
+from math import sqrt
 from typing import Any, TypeVar
 
 from actuator_lti.asked.quantities import MOST_RESONANCE_DB
@@ -35,7 +35,6 @@ from analyses.isolation import attempt
 HELD = {"current": "rotor locked", "velocity": "load moment held"}
 """How an inner loop is judged that is unstable by itself, by its name."""
 OPEN = {"current": "outer loops open and rotor free", "velocity": "outer loops open"}  # how it stands then
-FED_BACK = {"current": "the current", "velocity": "the measured speed"}
 AWAY = "the load, cogging or falling friction drives it away"
 ACTIVE = "held over a tick, as here and in the simulator, a slope over the angle is slightly active"
 
@@ -62,7 +61,8 @@ class LoopFigures:
 
     loop: Loop
     # What bandwidth and step are taken of, behind ``mean``: the closed loop; for the position loop the
-    # command to the output, feed-forward and filter of the command included. A plain or python-control system
+    # command to the output, feed-forward and filter of the command included; for another loop with a law of
+    # one's own its command to what it measures. A plain or python-control system
     plain_response: Any
     margins: StabilityMargins  # of the open loop
     # ``None`` where the closed loop is not stable, or has no such figure (then ``notes`` say why)
@@ -126,12 +126,13 @@ def loop_figures(
     """Compute all figures of a loop; ``certify``: its margins by exact arithmetic, see `stability_margins`.
 
     Bandwidth and step (that of a continuous loop with delays takes its time) are those of ``response``, else
-    of the closed loop, behind the ``mean`` of the command.
+    of what answers the command (the closed loop, mostly), behind the ``mean`` of the command.
 
     Raises `InputError`, `NumericalError`: if the margins cannot be found; another figure that cannot becomes
     a note.
     """
-    response = loop.plain_closed if response is None else response
+    answers = response, loop.plain_answer, loop.plain_closed
+    response = next(one for one in answers if one is not None)
     margins = stability_margins(loop.plain_open, certify=certify)
     if margins.stable is not True:
         return LoopFigures(loop, response, margins, None, None, None)
@@ -200,8 +201,6 @@ def all_loop_figures(
                 result[name] = _position(loops, loop, step=step, certify=certify)
             else:
                 result[name] = loop_figures(loop, step=step, certify=certify)
-            if name != "position" and result[name].stable:
-                result[name] = _with_law_told(loops, result[name], step)
             if name == "velocity" and result[name].stable:
                 result[name] = _with_speed_told(loops.design, result[name])
             if name == "current" and result[name].stable:
@@ -231,7 +230,7 @@ def all_loop_figures(
 def _with_speed_told(design: Design, figures: LoopFigures) -> LoopFigures:
     """The same of an outermost velocity loop with a note where its measured speed is not the speed itself."""
     encoder, velocity = design.encoder, design.controller.velocity
-    if velocity is None or design.controller.outermost != "velocity" or _takes_more(design, "velocity"):
+    if velocity is None or design.controller.outermost != "velocity":
         return figures
     if encoder.speed == "ideal" and not encoder.filter_time_s and not velocity.filters_on("speed"):
         return figures
@@ -239,32 +238,10 @@ def _with_speed_told(design: Design, figures: LoopFigures) -> LoopFigures:
     return replace(figures, notes=(*figures.notes, note))
 
 
-def _takes_more(design: Design, name: str) -> bool:
-    """Whether a law at a stage takes more than the error: then no 1/(1 + L) is its answer to the command."""
-    own = design.controller.own_law
-    return own is not None and own[0] == name and own[1].inputs != ("error",)
-
-
-def _with_law_told(loops: Loops, figures: LoopFigures, step: bool) -> LoopFigures:
-    """The same with a note of how a stage answers its command whose law takes more than the error."""
-    name = figures.loop.name
-    if not _takes_more(loops.design, name):
-        return figures
-    note = f"{name} loop: bandwidth and step are of the feedback alone, at what the law gives"
-    if step and loops.tick_system is not None:
-        system, what = sampled.answer(loops.tick_system.program.drive, name), FED_BACK[name]
-        band = _if_there_is(lambda: closed_loop_bandwidth(system).minus3db_rad_s, [])
-        own = _if_there_is(lambda: step_figures(system), [])
-        if band is not None and own is not None:
-            note += f"; {what} answers its command with -3 dB at {band / (2.0 * pi):.4g} Hz, an overshoot of "
-            note += f"{own.overshoot_percent:.4g} %, and is within 2 % after {own.settling_time_s:.4g} s"
-    return replace(figures, notes=(*figures.notes, note))
-
-
 def _with_feedforward_told(design: Design, figures: LoopFigures) -> LoopFigures:
     """The same of a current loop with a note on the feed-forward that its closed loop is without."""
     current = design.controller.current
-    if current is None or current.resistance_feedforward == 0.0:
+    if current is None or current.resistance_feedforward == 0.0 or not figures.of_feedback:
         return figures
     given = drive_gain(design) / torque_per_command(design)
     note = "current loop: all of this is of the feedback alone; with control.current.resistance_feedforward"

@@ -11,7 +11,7 @@ import numpy as np
 
 from actuator_lti.bounds import CSV_COLUMNS, MAT_BYTES, TABLE_BYTES, TABLE_ROWS
 from actuator_lti.errors import InputError, in_file
-from actuator_lti.files.mat5 import MatContent, read_mat5
+from actuator_lti.files.matlab import MatContent, read_mat
 from actuator_lti.files.reading import decode, parse_json, read_bytes, shown_path
 from actuator_lti.start.extras import need
 from actuator_lti.types import Floats
@@ -73,7 +73,7 @@ def load_mat(path: Path) -> tuple[MatContent, str]:
     """The content of a file, without its empty arrays, and its SHA-256."""
     data = read_bytes(path, ".mat file", MAT_BYTES)
     with in_file(str(path)):
-        content = read_mat5(data)
+        content = read_mat(data)
     content.arrays = {key: value for key, value in content.arrays.items() if value.size}
     return content, hashlib.sha256(data).hexdigest()
 

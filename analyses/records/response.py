@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from actuator_lti.bounds import CSV_COLUMNS, MAT_BYTES, TABLE_BYTES, TABLE_ROWS
 from actuator_lti.errors import InputError, in_file
-from actuator_lti.files.mat5 import read_mat5
+from actuator_lti.files.matlab import read_mat
 from actuator_lti.files.reading import UTF_16, read_bytes, shown, shown_path
 from actuator_lti.measured.response import (
     CONFIDENCE,
@@ -130,7 +130,7 @@ def read_response(source: Path | str | Any, averages: int | None = None) -> Reco
 
 def _matlab(data: bytes) -> dict[str, Floats]:
     """The arrays of a file, complex ones as both parts; of a structure's its text ``...Unit`` with it."""
-    content = read_mat5(data)
+    content = read_mat(data)
     columns = {name: values.ravel() for name, values in content.arrays.items()}
     for name, values in content.complexes.items():
         columns |= {f"{name}.real": values.real.ravel(), f"{name}.imag": values.imag.ravel()}

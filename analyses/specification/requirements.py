@@ -219,7 +219,8 @@ def which_response(quantity: str, loop: str, to: ResponseTo = "command", design:
 
     Bandwidth, resonance and step of the position loop are those of the response to the user's command,
     with profile, filter and feed-forward, or to the reference behind profile and filter; of an inner loop,
-    those of the feedback loop. Of ``design`` only the parts are named that it has.
+    those of the feedback loop, or with a law of one's own of the response to its command. Of ``design`` only
+    the parts are named that it has.
 
     >>> which_response("bandwidth", "position"), which_response("phase_margin", "position")
     ('of the response to the command: mean of its profile, filter and feed-forward included', '')
@@ -227,7 +228,8 @@ def which_response(quantity: str, loop: str, to: ResponseTo = "command", design:
     if not QUANTITIES[quantity].of_response:
         return ""
     if loop != "position":
-        return "of the feedback loop"
+        own = design.controller.own_law if design else None
+        return "of the response to its command" if own and own[0] == loop else "of the feedback loop"
     if to == "reference":
         return "of the response to the reference, behind profile and filter of the command"
     parts = ["mean of its profile", "filter", "feed-forward"]

@@ -105,7 +105,8 @@ class Bench:
     @cached_property
     def figures(self) -> dict[str, LoopFigures]:
         """Figures of the loops with the outer ones open, by stage."""
-        return {name: loop_figures(self.loop(name)) for name in wire(self.design).stages}
+        loops = {name: self.loop(name) for name in wire(self.design).stages}
+        return {name: loop_figures(loop, loop.plain_closed) for name, loop in loops.items()}
 
     def place(self, name: str) -> Place:
         """One of `names`, its tangent measured."""

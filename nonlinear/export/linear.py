@@ -24,6 +24,7 @@ MOST = 48  # states of a loop
 CURRENT, VELOCITY, POSITION, COMMAND = range(4)
 AT_SPEED, AT_CURRENT, AT_VOLTAGE = range(4, 7)  # break points of the closed drive; POSITION is the output's
 AT_LAW = 7  # what a law of one's own of the current gives, before feed-forward
+ANSWER = 8  # of the current or the velocity, with a law of one's own, to its command: that loop run closed
 # the probe of each; -1: it is run through its command
 POINT = (
     layout.POINT_CURRENT, -1, layout.POINT_OUTPUT, -1,
@@ -46,10 +47,19 @@ REMEMBERED = np.array([
 ])  # fmt: skip
 
 
+def answering(q, stage):
+    """The stage that a loop is of: an answer is that of the stage with a law of one's own."""
+    if stage != ANSWER:
+        return stage
+    return CURRENT if q[layout.OWN_STAGE] == layout.OWN_CURRENT else VELOCITY
+
+
 def cut_of(q, stage):
     """Where the loop of a stage is cut: with a law of one's own at what that gives."""
     # only to that of the current something is added on the way to the break point that it drives
     own = q[layout.OWN_STAGE]
+    if stage == ANSWER:
+        return answering(q, stage)
     position = stage == POSITION and own == layout.OWN_POSITION
     if stage == CURRENT and own == layout.OWN_CURRENT:
         return AT_LAW
@@ -79,10 +89,10 @@ def command_interval(q):
 def interval(q, stage):
     """Ticks from one update of the signal at a cut to the next; 0 where the drive has no such loop."""
     current, velocity = q[layout.HAS_CURRENT] > 0.0, q[layout.HAS_VELOCITY] > 0.0
-    position = q[layout.HAS_POSITION] > 0.0
-    if stage == CURRENT:
+    position, of = q[layout.HAS_POSITION] > 0.0, answering(q, stage)
+    if of == CURRENT:
         return 1 if current else NO_LOOP
-    if stage == VELOCITY:
+    if of == VELOCITY:
         return speed_interval(q) if velocity else NO_LOOP
     if stage == POSITION or stage == COMMAND or stage == AT_SPEED:
         there = stage == COMMAND or (position and (stage == POSITION or velocity))
@@ -98,7 +108,7 @@ def repeats(q, stage):
     """Ticks after which the loop repeats: more than `interval` where it is periodic."""
     every = interval(q, stage)
     speed = speed_interval(q) if feeds_speed(q) else 1
-    if stage == CURRENT:
+    if answering(q, stage) == CURRENT:
         return max(every, speed)
     if stage != AT_CURRENT and stage != AT_VOLTAGE:
         return every
@@ -240,13 +250,15 @@ def cut_here(q, stage):
 
 def prepared(q, s, stage):
     """Make ``q`` the row of the linear drive with its loop cut, and derive it; 0 where it is too long."""
-    if stage == CURRENT or stage == VELOCITY:  # no stages outside; its command is then that of the drive
+    of = answering(q, stage)
+    if of == CURRENT or of == VELOCITY:  # no stages outside; its command is then that of the drive
         q[layout.HAS_POSITION], q[layout.COMMAND_FILTERS] = 0.0, 0.0
     if stage == CURRENT:
         q[layout.RESISTANCE_FEEDFORWARD] = 0.0
-        if repeats(q, stage) == 1:  # one whose slower measurement is fed to the voltage stays, its output cut
+    if of == CURRENT:
+        if repeats(q, of) == 1:  # one whose slower measurement is fed to the voltage stays, its output cut
             q[layout.HAS_VELOCITY] = 0.0
-        cut_here(q, stage)
+        cut_here(q, of)
     cut_here(q, cut_of(q, stage))
     prepare_sizes(q)
     if not (q[layout.DELAY_LINE] + q[layout.DIFFERENCE_SAMPLES] <= MOST):  # those alone pass it

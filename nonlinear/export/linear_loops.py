@@ -115,20 +115,25 @@ def assembled(p, q, s, io, stage, blocks, places, keep, seen, a, b, c):
     if kept > MOST_STATES:
         return linear.TOO_LONG
     joined(n, count, kept, blocks, keep, a, b, c)
-    if count > 1 or linear.runs_closed(linear.cut_of(q, stage)):
+    if stage != linear.ANSWER and (count > 1 or linear.runs_closed(linear.cut_of(q, stage))):
         for i in range(kept):
             for j in range(kept):
                 a[i * kept + j] += b[i] * c[j]
     return kept
 
 
-def lead_of(p):
-    """Feed-forward in front of a position loop as k_ff/(Kv T), NaN where it is more than that."""
+def lead_of(p, stage):
+    """Feed-forward in front of a position loop as k_ff/(Kv T), NaN where it is more than that; of others 0.
+
+    NaN as well where the stage has a law of one's own.
+    """
+    if p[layout.OWN_STAGE] == float(stage + 1):
+        return math.nan
+    if stage != linear.POSITION:
+        return 0.0
     if p[layout.ELASTIC_DRIVE] > 0.0 and p[layout.RIGID] <= 0.0 and p[layout.OUTPUT_SENSOR] <= 0.0:
         return math.nan  # the loop feeds back another angle than the output's
     if p[layout.POSITION_INTEGRAL] != 0.0 or p[layout.DERIVATIVE] != 0.0:
-        return math.nan
-    if p[layout.OWN_STAGE] == layout.OWN_POSITION:
         return math.nan
     if p[layout.ACCELERATION_FEEDFORWARD] != 0.0 or p[layout.COMMAND_FILTERS] > 0.0:
         return math.nan

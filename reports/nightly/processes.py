@@ -22,15 +22,14 @@ from threading import Lock, Thread, Timer, get_ident
 from typing import Any, NamedTuple
 
 from actuator_lti.errors import InputError
+from actuator_lti.start.apart import apart, limit_memory
 from analyses.studies.engine import Engine
-from reports.arithmetic import ONE_THREAD  # the jobs themselves are what runs in parallel
 from reports.nightly.cache import sealed
 from reports.nightly.text import one_line
 
 START_LIMIT_S = 180.0
 END_S = 10.0
 READY = b"ready"
-_CHILD = "import sys; from reports.nightly.processes import main; main(sys.argv[1], int(sys.argv[2]))"
 
 
 class Task(NamedTuple):
@@ -123,9 +122,8 @@ class _Child:
         self._late = self._ready = False
         self._asked = Lock()
         self._process = subprocess.Popen(
-            [sys.executable, "-P", "-c", _CHILD, limits.build, str(limits.memory_bytes)],
+            **apart(f"{__name__}:main", limits.build, str(limits.memory_bytes)),
             stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=self._said,
-            env={**os.environ, **ONE_THREAD, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))},
         )  # fmt: skip
 
     @property
@@ -193,7 +191,7 @@ class _Child:
 # ---- the side of the process ---------------------------------------------------------------------------
 
 
-def main(build: str, memory_bytes: int) -> None:
+def main(build: str, memory_bytes: str) -> None:
     """Read ``(key, payload)`` from standard input, build, answer on standard output; never returns."""
     if sys.platform == "linux":  # the system ends this process with its parent, in whatever build it is
         import ctypes
@@ -202,7 +200,7 @@ def main(build: str, memory_bytes: int) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     answers = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)  # what a build prints is no answer
-    _limit_memory(memory_bytes)
+    limit_memory(int(memory_bytes))
     questions: SimpleQueue[tuple[str, Mapping[str, Any]]] = SimpleQueue()
     source = os.fdopen(os.dup(0), "rb")
 
@@ -244,16 +242,3 @@ def execute(function: Callable[..., Any], key: str, payload: Mapping[str, Any]) 
 def _say(pipe: Any, what: Any) -> None:
     pickle.dump(what, pipe)
     pipe.flush()
-
-
-def _limit_memory(limit_bytes: int) -> None:
-    """Bound what this process may allocate; beyond it Python raises MemoryError, others give up.
-
-    Counted is what can be written to (heap, stacks, private mappings), not files and code that are mapped.
-    """
-    with suppress(ImportError):  # Windows has no such limit
-        import resource
-
-        hard = resource.getrlimit(resource.RLIMIT_DATA)[1]
-        most = limit_bytes if hard == resource.RLIM_INFINITY else min(limit_bytes, hard)
-        resource.setrlimit(resource.RLIMIT_DATA, (most, hard))

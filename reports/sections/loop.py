@@ -127,8 +127,7 @@ def step(
     panel.y.limits(low=min(0.0, 1.05 * lowest))
     if math.isfinite(figures.final_value) and not margins.returns(loop_figures):
         step_figures(panel, figures, responses[0], scale, held and len(responses[0][1]) < 80)
-    of = "the feedback alone" if loop_figures.of_feedback and loop_figures.loop.at_law else "its command"
-    caption = f"{title}, response to a unit step of {of}; the band is 2 % about the final value."
+    caption = f"{title}, response to a unit step of its command; the band is 2 % about the final value."
     if end is not None and float(figures.settling_time_s) > end:
         caption += " With the rotor free, back-EMF keeps it from settling within the time shown."
     return doc.figure("step", chart, caption=caption, alt=f"Step response. {caption}", layout="half")

@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from fuzz import attack, written
+from scipy.io import savemat
 from targets import CAMPAIGN, SPEC, Target, parquet_file, small_report, targets
 
 from actuator_lti import bounds
@@ -29,7 +30,7 @@ from nonlinear import commands
 from tests import refusals
 
 SEED = 18
-INPUTS = {"command": 12, "history": 100, "study": 100}  # by the first word of a target's name
+INPUTS = {"command": 12, "history": 100, "mat": 25, "study": 100}  # by the first word of a target's name
 LINES = 100  # of the target "command line"
 USUAL = 400
 
@@ -212,9 +213,9 @@ def test_a_small_file_that_unpacks_to_gigabytes(tmp_path) -> None:
     path, most = tmp_path / "b.mat", bounds.MAT_VALUES.most
     path.write_bytes(packed_zeros(9 * most))
     assert path.stat().st_size < 4_000_000
-    refusals.refused(read_record, path, SPEC, words=("b.mat", "more than allowed: at most 50000000"))
-    path.write_bytes(packed_zeros(most + (1 << 20)))
-    refusals.refused(read_record, path, SPEC, words=("numbers of a .mat or Parquet file",))
+    refusals.refused(read_record, path, SPEC, words=("b.mat", "numbers of a .mat or Parquet file"))
+    savemat(path, {"s": {"x": np.zeros(6 * most, np.uint8)}}, do_compression=True)
+    refusals.refused(read_record, path, SPEC, words="more than allowed: at most 50000000")
 
 
 def test_twenty_thousand_runs_are_read_and_one_more_than_allowed_is_not(tmp_path, monkeypatch) -> None:

@@ -17,7 +17,7 @@ from hypothesis import strategies as st
 from scipy.io import savemat
 
 from actuator_lti.errors import InputError
-from actuator_lti.files.mat5 import read_mat5
+from actuator_lti.files.matlab import read_mat
 from analyses.records import csv_stream as module
 from analyses.records.csv_stream import BoundedRows, read_csv_record, stream_csv
 from analyses.records.open_record import open_record
@@ -133,7 +133,7 @@ def test_a_compressed_and_a_plain_file_read_alike() -> None:
     for packed in (False, True):
         stream = io.BytesIO()
         savemat(stream, values, do_compression=packed)
-        content = read_mat5(stream.getvalue())
+        content = read_mat(stream.getvalue())
         assert content.arrays["t"].ravel().tolist() == [0.0, 1.0, 2.0, 3.0, 4.0]
         assert content.arrays["n"].tolist() == [[1.0, 2.0], [3.0, 4.0]]
         assert content.arrays["k"].item() == 3.5
@@ -227,7 +227,7 @@ def _signal(text: str) -> Callable[[Path], None]:
 
 @pytest.mark.parametrize(("write", "reason"), [
     (lambda p: savemat(p / "r.mat", {"X": TABLE}), "layout is not known"),
-    (lambda p: (p / "r.mat").write_bytes(b"MATLAB"), "too short"),
+    (lambda p: (p / "r.mat").write_bytes(b"MATLAB"), "no MATLAB file"),
     (lambda p: (p / "r.json").write_text("[1, 2]"), "columns by name, or a list of rows"),
     (lambda p: (p / "r.parquet").write_bytes(b"PAR1PAR1"), "is no Parquet file"),
     (lambda p: (p / "r.csv").write_text("time,current\n1,2\n"), "has no unit in its name"),

@@ -14,7 +14,6 @@ from actuator_lti.design import load_design, model, parameter_value, read_design
 from actuator_lti.errors import InputError
 from actuator_lti.types import Floats
 from analyses.estimation.parameters import own_std
-from analyses.identification import response_model
 from analyses.identification.measured_response import ResponseResult, identify_response
 from reports.charts.chart import Curve
 from reports.charts.data import chart_of
@@ -125,11 +124,11 @@ def test_a_response_without_noise_gives_the_truth(of: str, tmp_path) -> None:
     assert result.passed
 
 
-@pytest.mark.parametrize(("deviation", "count"), [(0.01, 60), (0.1, 400)])
+@pytest.mark.parametrize(("deviation", "count"), [(0.01, 60), (0.12, 250)])
 def test_intervals_hold_what_they_say(deviation: float, count: int, tmp_path) -> None:
     """Errors over their standard errors: mean square 1 within 3 sigma of chi-square, misfit as well.
 
-    Of many frequencies a weight over the measured size, which noise of 10 % moves, is a bias of 2 of them.
+    Of many frequencies a weight over the measured size, which noise of 12 % moves, is a bias of 2 of them.
     """
     options = {"hertz": np.geomspace(0.5, 400.0, count)}
     results = [
@@ -141,20 +140,6 @@ def test_intervals_hold_what_they_say(deviation: float, count: int, tmp_path) ->
     near = 3.0 * np.sqrt(0.5 / (2 * count - len(TRUTH)))
     assert [one.fit.misfit for one in results] == pytest.approx([1.0] * 6, abs=near)
     assert all(one.passed for one in results)
-
-
-def test_a_search_goes_from_tick_to_tick_of_the_delay(monkeypatch, tmp_path) -> None:
-    """A slope over the delay is that within its tick: a step to 100 of them took 100 states, and a minute."""
-    asked, real = list[float](), response_model.stacked
-
-    def noted(design: model.Design, values: dict[str, Floats]) -> object:
-        asked.extend(np.atleast_1d(values.get("control.computing_delay", TICK)).tolist())
-        return real(design, values)
-
-    monkeypatch.setattr(response_model, "stacked", noted)
-    hertz = np.geomspace(0.5, 40.0, 60)
-    _found(tmp_path, "T", 0.03, 2, stated=False, off=_far(2), hertz=hertz)
-    assert np.diff(np.unique(asked)).max() < 1.001 * TICK
 
 
 @pytest.mark.parametrize(("of", "seed"), [("L", 4), ("T", 0)])

@@ -208,7 +208,10 @@ def delayed_forms(
 
 
 def behind_part_of_a_sample(family: Family, seed: int, k: int) -> tuple[str, str]:
-    """("right" | "withheld" | "wrong" | "refused" | "none", what) of a sampled loop behind p/r samples."""
+    """("right" | ... | "none", what) of a sampled loop behind p/r samples, as `tried`.
+
+    Undetermined is what is so without the delay, too.
+    """
     rng = np.random.default_rng([seed, k])
     loop = family(rng)
     part = Fraction(int(rng.integers(1, 8)), int(rng.choice([2, 3, 4])))
@@ -219,7 +222,8 @@ def behind_part_of_a_sample(family: Family, seed: int, k: int) -> tuple[str, str
     except (InputError, NumericalError) as error:
         return "refused", str(error)
     if m.withheld:
-        return "withheld", m.evidence_reason
+        known = determined(loop, truth_of(loop), rng)
+        return "withheld" if known else "undetermined", m.evidence_reason
     end = math.pi / float(loop.dt) * (1.0 - 1e-12)
     ours = facts(m)
     inside = Facts(None, [g for g in ours.gains if 0.0 < g[0] < end], ours.phases)

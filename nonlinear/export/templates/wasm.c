@@ -123,7 +123,12 @@ EXPORT("phases_of") int phases_of(int stage)
 
     return (every > 0) ? drive_repeats(p, stage) / every : 0;
 }
-EXPORT("lead_of") double lead_of(int stage) { return loops[stage].lead; }
+
+/* Where the response is that bandwidth and step of a loop are taken of; the closed loop itself where no other is. */
+static int answering(int stage)
+{
+    return !(stage < COMMAND && isnan(loops[stage].lead)) ? stage : (stage == POSITION) ? COMMAND : ANSWER;
+}
 
 /* Matrices and figures of one loop; its states, or why there are none. */
 static int one(int stage, double lead, int timed)
@@ -167,25 +172,26 @@ static int one(int stage, double lead, int timed)
 
 /*
  * A loop and its figures; its states, 0 where the drive has no such loop, less where it cannot be had. Figures of
- * a closed position loop are from command to output, as in actuator_lti.batch.
+ * a closed position loop are from command to output, those of a stage with a law of one's own from its command, as
+ * in actuator_lti.batch.
  */
 EXPORT("loop") int loop(int stage, int timed)
 {
-    const double lead = (stage == POSITION) ? drive_lead_of(p) : 0.0;
+    const double lead = (stage < COMMAND) ? drive_lead_of(p, stage) : 0.0;
     const int n = isnan(lead) ? one(stage, 0.0, 0) : one(stage, lead, timed);
 
     if (n > 0 && isnan(lead)) {
-        loop_t *const own = &loops[POSITION];
-        loop_t *const whole = &loops[COMMAND];
+        loop_t *const own = &loops[stage];
 
-        if (one(COMMAND, NAN, timed) <= 0) {
+        own->lead = NAN;
+        const loop_t *const whole = &loops[answering(stage)];
+        if (one(answering(stage), NAN, timed) <= 0) {
             return 0;
         }
         for (int k = FIRST_CLOSED; k <= LAST_CLOSED; k += 1) {
             own->row[k] = whole->row[k];
         }
         drive_quoted(own->row, own->period, own->quoted);
-        own->lead = NAN;
     }
     return n;
 }
@@ -202,10 +208,10 @@ EXPORT("respond") int respond(int stage, int count)
     return count;
 }
 
-/* Step response of the closed loop at count samples, in y. */
+/* Step response of the closed loop, or of what answers its command, at count samples, in y. */
 EXPORT("step_of") int step_of(int stage, int count)
 {
-    const loop_t *const it = &loops[stage];
+    const loop_t *const it = &loops[answering(stage)];
 
     if (it->n <= 0 || count > MOST_OUT) {
         return 0;

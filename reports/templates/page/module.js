@@ -64,11 +64,7 @@ export const respond = (name, hertz) => {
   return { re, im };
 };
 
-export const stepOf = (name, count) => {
-  let stage = stageOf(name);
-  if (name === "position" && Number.isNaN(x.lead_of(stage))) stage = 3; // the whole path from the command
-  return x.step_of(stage, count) > 0 ? Array.from(view(x.y_at(), count)) : null;
-};
+export const stepOf = (name, count) => (x.step_of(stageOf(name), count) > 0 ? Array.from(view(x.y_at(), count)) : null);
 
 export const meanAt = (row, turns) => { // gain and phase of the mean over n samples that limits the jerk
   const n = row[data.places.mean], half = Math.PI * turns;
