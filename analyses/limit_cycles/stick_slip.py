@@ -1,24 +1,33 @@
 """Stick-slip hunting, predicted exactly where a describing function is blind: rest, breakaway, slip, rest.
 
-A speed integral winds up while the rotor rests at an error E, until the drive torque reaches breakaway; then
-the drive is the sampled linear loop with the smaller sliding friction until the speed returns to zero.  A
-symmetric cycle is an E that the slip turns into -E.
+A controller winds up while the rotor rests at an error E, until the drive torque reaches breakaway; then the
+drive is the sampled linear loop with the smaller sliding friction until the speed returns to zero. A cycle
+is an E that the slip turns into -E. A constant load and an offset of friction move the integral alone.
+
+At rest the drive is linear as well, whatever the controller is: the loop with a rotor that nothing moves.
+With one mode at 1 (an integral), l and v its left and right vector, the other states z come to a ramp along
+v, and ``l z`` says how far. What else moves has died out by the next breakaway.
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.optimize import brentq
 
 from actuator_lti.design.model import Design
-from actuator_lti.drive.facts import breakaway_torque_Nm
-from actuator_lti.drive.steady import drive_gain, steady_input
+from actuator_lti.drive.operating import straight
+from actuator_lti.drive.steady import steady_input
 from actuator_lti.loops import Loops, assemble_loops
-from analyses.large_signal.tones import AT_REST, settling_ticks_in_periods, without_value
+from actuator_lti.loops.assemble import loops_at
+from actuator_lti.loops.simulation import TickSystem
+from actuator_lti.types import Floats
+from analyses.large_signal.tones import settling_ticks_in_periods
 
-SMALLEST, LARGEST, POINTS = 1e-3, 1.0, 241  # of the threshold
+SMALLEST, LARGEST, POINTS = 1e-3, 1.0, 241  # of the error that breaks away before anything has wound up
 SLOPE_STEP = 1e-3
+HELD = 1e30  # so many times its inertia hold the rotor
+AT_ONE = 1e-6  # an eigenvalue so near to 1 integrates
 
 
 @dataclass(frozen=True)
@@ -38,40 +47,43 @@ class StickSlipCycle:
 
 @dataclass(frozen=True)
 class _Slip:
-    """Slip from breakaway as the sum of a part that goes with E and a part that does not."""
+    """Slip from breakaway as the sum of a part that goes with E and a part that does not, and rest."""
 
     period_s: float
-    gain: float
-    integral_gain: float
-    start: float
-    w: np.ndarray
-    th: np.ndarray
-    command: np.ndarray
+    states: tuple[str, ...]
+    runs: Floats  # of both parts, tick by tick, shape (2, ticks, states), from where they break away
+    counts: Floats  # what l z is when the next period begins, of the states at each tick of one that rests
+    pace: float  # growth of l z over a period at a motor angle of 1
 
     def from_error(self, error: float) -> tuple[float, float, float] | None:
         """Error after the slip in its direction, duration, rest until the next; None: it does not end."""
-        w = self.w[0] + error * self.w[1]
+        x = self.runs[0] + error * self.runs[1]
+        w = x[:, self.states.index("w")]
         ends = np.flatnonzero((w[1:-1] > 0.0) & (w[2:] <= 0.0)) + 1
         if not ends.size:
             return None
         k = int(ends[0])
         part = w[k] / (w[k] - w[k + 1])
-        th, command = (
-            float((1.0 - part) * (a[0, k] + error * a[1, k]) + part * (a[0, k + 1] + error * a[1, k + 1]))
-            for a in (self.th, self.command)
-        )
-        if th <= 0.0:
-            return -th, float(k + part) * self.period_s, math.inf
-        # the error is now -th: the command falls from its value at landing to -start
-        rest = (command + self.start) / (self.integral_gain * self.gain * th)
-        return -th, float(k + part) * self.period_s, max(rest, 0.0)
+        landed = (1.0 - part) * x[k] + part * x[k + 1]
+        th, slipping = float(landed[self.states.index("th")]), float(k + part) * self.period_s
+        return -th, slipping, math.inf if th <= 0.0 else max(self._rest_s(landed, th, k), 0.0)
+
+    def _rest_s(self, landed: Floats, th: float, tick: int) -> float:
+        """Time from landing until the state is that of breakaway the other way, -l z of the error ``th``."""
+        ticks = len(self.counts) - 1
+        goes = -self.counts[-1] @ (self.runs[0, 0] + th * self.runs[1, 0])
+        periods = (goes - self.counts[tick % ticks] @ landed) / (self.pace * th)
+        return float(ticks * (1.0 + periods) - tick % ticks) * self.period_s
 
 
 def stick_slip_cycle(design: Design, load_Nm: float, loops: Loops | None = None) -> StickSlipCycle | None:
-    """The symmetric cycle of an integrating speed controller, by its sampled sliding ``loops``, if any."""
+    """The symmetric cycle of an integrating controller, by its sampled sliding ``loops``, if any."""
     if (slip := _slip(design, load_Nm, loops)) is None:
         return None
-    grid = slip.start / slip.gain * np.geomspace(SMALLEST, LARGEST, POINTS)
+    first, by_error = slip.runs[:, 0] @ slip.counts[-1]
+    if not by_error < 0.0:
+        return None
+    grid = -first / by_error * np.geomspace(SMALLEST, LARGEST, POINTS)
 
     def surplus(error: float) -> float:
         result = slip.from_error(error)
@@ -92,35 +104,69 @@ def stick_slip_cycle(design: Design, load_Nm: float, loops: Loops | None = None)
     return StickSlipCycle(error / design.total_ratio, 0.5 / (slipping + resting), resting, slope)
 
 
-def _slip(design: Design, load_Nm: float, loops: Loops | None) -> _Slip | None:
-    """Follow the slip after breakaway; None: not that of the linear loop with one constant friction."""
-    control, friction = design.controller, design.friction
-    velocity, plain = control.velocity, control.own_law is None  # what such a law does meanwhile is not known
-    alike = friction.dry_torque_reverse_Nm is None and friction.offset_torque_Nm == 0.0
+def _alone(design: Design, load_Nm: float) -> bool:
+    """Whether one dry friction, the same both ways, is all that is not linear in the drive."""
+    friction, coupling, behind = design.friction, design.coupling, design.load.friction
+    alike = friction.dry_torque_reverse_Nm is None and friction.viscous_reverse_Nms_rad is None
     rubs = friction.law == "coulomb" and not friction.points and friction.dry_Nm(load_Nm) > 0.0
-    if not (plain and alike and rubs and design.load.path != "back-drivable"):
-        return None
-    if velocity is None or velocity.integral_time_s is None:
+    dry_behind = behind is not None and behind.dry_torque_Nm > 0.0
+    beyond = coupling is not None and (coupling.play_rad or friction.load_coefficient or dry_behind)
+    return alike and rubs and not beyond and straight(design) == design
+
+
+def _slip(design: Design, load_Nm: float, loops: Loops | None) -> _Slip | None:
+    """Follow the slip after breakaway; None: nothing winds up, or more than sticking is not linear."""
+    if not _alone(design, load_Nm):
         return None
     loops = assemble_loops(design) if loops is None else loops
-    if (system := loops.tick_system) is None:
+    rotor = replace(design.motor, rotor_inertia_kgm2=HELD * design.motor.rotor_inertia_kgm2)
+    held = loops_at(replace(design, motor=rotor), loops.operating, loops.form).tick_system
+    dry = design.friction.dry_Nm(load_Nm)
+    if (system := loops.tick_system) is None or held is None:
         return None
+    if (stands := _stands(design, held, dry * design.friction.breakaway_ratio)) is None:
+        return None
+    (*starts, count), pace = stands
+    counts = [count]
+    for j in reversed(range(held.ticks)):
+        counts.append(counts[-1] @ held.matrices(j)[0])
     ticks = settling_ticks_in_periods(loops)
-    torque = breakaway_torque_Nm(design, load_Nm, 1)
-    current, volts = steady_input(design, torque, 0.0)
-    start = torque / float(drive_gain(design))
-    gain = velocity.gain * control.position_loop.gain
-    held = {"i": start, "velocity.I": start, "hold_i_ref": start}
-    if design.motor.has_electrical_dynamics:
-        held["i"] = current
-    held |= {"current.I": volts} | {name: volts for name in system.states if name[0] == "u"}
-    error = {"th": -1.0, "velocity.I": -gain, "hold_w_ref": control.position_loop.gain}
-    if without_value(system.states, held.keys() | error.keys(), AT_REST):
-        return None  # what a filter, say, holds before breakaway is not known here
-    runs = []
-    for state, torque in ((held, -friction.dry_Nm(load_Nm)), (error, 0.0)):
-        rest = system.initial_state({k: v for k, v in state.items() if k in system.states})
-        runs.append(system.respond(np.zeros(ticks), torque, rest))
-    names = ("w", "th", "u" if control.current is None else "i_ref")
-    w, th, command = (np.array([run[name] for run in runs]) for name in names)
-    return _Slip(control.period_s, gain, 1.0 / velocity.integral_time_s, start, w, th, command)
+    runs = [_run(system, x, torque, ticks) for x, torque in zip(starts, (-dry, 0.0), strict=True)]
+    return _Slip(design.controller.period_s, system.states, np.array(runs), np.array(counts[::-1]), pace)
+
+
+def _stands(design: Design, held: TickSystem, torque_Nm: float) -> tuple[Floats, float] | None:
+    """As the drive breaks away: the states without an error, by an error of 1, and l; growth of l z.
+
+    None: not one mode integrates, or one grows.
+    """
+    names, over = held.states, np.eye(len(held.states))
+    for j in range(held.ticks):
+        over = held.matrices(j)[0] @ over
+    th = names.index("th")
+    moves = np.array([k for k, name in enumerate(names) if name not in ("w", "th")])
+    A, fed = over[np.ix_(moves, moves)], over[moves, th]
+    modes = np.linalg.eigvals(A)
+    integrates = np.abs(modes - 1.0) < AT_ONE
+    if integrates.sum() != 1 or np.abs(modes[~integrates]).max(initial=0.0) > 1.0 - AT_ONE:
+        return None
+    current, volts = steady_input(design, torque_Nm, 0.0)
+    seen, level = ("i", current) if "i" in names else ("u", volts)
+    row = held.matrices(0)[2][held.outputs.index(seen)]
+    left, _, right = np.linalg.svd(A - np.eye(len(A)))
+    ramp = right[-1] / (row[moves] @ right[-1])
+    count = left[:, -1] / (left[:, -1] @ ramp)
+    whole = np.block([[np.eye(len(A)) - A, ramp[:, None]], [row[moves], 0.0]])  # of z, and its growth
+    given = np.array([[*(0.0 * fed), level], [*-fed, row[th]]])
+    found = np.zeros((3, len(names)))
+    found[:2, moves], found[1, th], found[2, moves] = np.linalg.solve(whole, given.T).T[:, :-1], -1.0, count
+    return found, float(count @ fed)
+
+
+def _run(system: TickSystem, state: Floats, torque_Nm: float, count: int) -> Floats:
+    """The states at so many ticks under a constant torque at the motor."""
+    ticks, run = [system.matrices(j) for j in range(system.ticks)], np.empty((count, len(state)))
+    for k in range(count):
+        A, B, _, _ = ticks[k % system.ticks]
+        run[k], state = state, A @ state + B[:, 1] * torque_Nm
+    return run

@@ -39,7 +39,7 @@ def section(result: FrictionEffects) -> doc.Section:
 
 def _cycle_verdict(design: Design, point: FrictionPoint, fine: Unit, load: str) -> doc.VerdictItem:
     cycles, swing = point.cycles, noticed(design, point.cycles.settlings)
-    slip = "none" if design.controller.own_law is None else "not made of a law of one's own"
+    slip = "none"
     if (one := cycles.stick_slip) is not None:
         size, kind = fine.of(one.output_amplitude_rad), "" if one.stable else ", unstable"
         slip = f"±{size} at {one.frequency_hz:.3g} Hz{kind}"

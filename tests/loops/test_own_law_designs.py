@@ -208,7 +208,6 @@ def test_why_a_drive_has_no_threshold_is_said_of_its_law_and_of_its_friction() -
         told = friction_section(friction_effects(changed(design, validation={"loads_Nm": (0.0,)})))
         assert words in f"{told}"
         assert ("creeps" in f"{told}") is (design is smooth)
-        assert ("stick-slip analysis: not made of a law" in f"{told}") is (design is own)
 
 
 def test_the_rule_of_the_position_takes_the_crossover_of_the_law_inside() -> None:

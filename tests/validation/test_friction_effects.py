@@ -15,7 +15,7 @@ from analyses.friction_effects.orbit import Orbit
 from analyses.friction_effects.result import limit_cycles
 from analyses.friction_effects.reversal import Hysteresis, _width, hysteresis
 from analyses.large_signal.tones import linear_steady_state
-from analyses.limit_cycles.stick_slip import _slip, stick_slip_cycle
+from analyses.limit_cycles.stick_slip import stick_slip_cycle
 from analyses.motion.settling import SMALL, settle, settlings_of
 from nonlinear import Rows
 from nonlinear.bench.operating_motion import quiet
@@ -23,6 +23,7 @@ from nonlinear.settling.rest import first_motion_s
 from reports.sections.friction_effects import section
 from tests.changed import changed
 from tests.loops.loop_designs import MOTOR
+from tests.loops.own_laws import as_law
 from tests.nonlinear.elastic_drive import stribeck
 
 AMBER, EMPS, JOINT = (load_design(name) for name in ("ilr33-amber", "emps", "joint"))
@@ -198,18 +199,36 @@ def test_friction_keeps_an_unstable_loop_quiet_up_to_the_foreseen_amplitude(load
     assert item.frequency_hz == pytest.approx(item.cycle.frequency_hz, rel=0.08)
 
 
-@pytest.mark.parametrize("integral_time", [15e-3, 3e-3])
-@pytest.mark.parametrize("gain", [60.0, 120.0, 250.0])
-def test_stick_slip_is_foreseen(integral_time: float, gain: float) -> None:
-    """Breakaway 1.5: amplitude within 6 %, frequency within 3 %; also where larger steps slide to rest."""
-    values = {"friction.breakaway_ratio": 1.5, "control.velocity.integral_time": integral_time}
-    design = with_values(AMBER, {**values, "control.position.gain": gain})
-    cycles = friction_effects(design).points[0].cycles
+STICKY = changed(AMBER, friction={"breakaway_ratio": 1.5})
+OF_POSITION = changed(STICKY, controller={"velocity": {"integral_time_s": None},
+                                          "position": {"integral_time_s": 0.05}})  # fmt: skip
+LOW_PASS = model.Filter(on="torque", kind="lowpass", frequency_rad_s=2000.0)
+TRACKING = model.Encoder(speed="tracking", bandwidth_rad_s=800.0)
+HUNTING = {
+    f"Tn {t}, Kv {k}": with_values(STICKY, {"control.velocity.integral_time": t, "control.position.gain": k})
+    for t in (15e-3, 3e-3) for k in (60.0, 120.0, 250.0)
+} | {
+    "slower stages": changed(load_design("ilr33-amber-multirate"), friction={"breakaway_ratio": 1.5}),
+    "torque filter": changed(STICKY, controller={"velocity": {"filters": (LOW_PASS,)}}),
+    "tracking": changed(STICKY, encoder=TRACKING),
+    "law": as_law(STICKY, "velocity"),
+    "position integral": OF_POSITION,
+    "law of the position": as_law(OF_POSITION, "position"),
+    "driven by its load": changed(STICKY, load={"path": "back-drivable"}, validation={"loads_Nm": (3.0,)}),
+    "offset": changed(STICKY, friction={"offset_torque_Nm": 1e-3}),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", HUNTING)
+def test_stick_slip_is_foreseen(name: str) -> None:
+    """Breakaway 1.5, whatever winds up, by up to 6e-3 in a tick; also where larger steps slide to rest."""
+    design = quiet(HUNTING[name])
+    cycles = friction_effects(design).points[-1].cycles
     assert cycles.stick_slip.stable
     assert cycles.as_predicted
     swing = cycles.hunting
-    assert swing.swing_rad == pytest.approx(cycles.stick_slip.output_amplitude_rad, rel=0.06)
-    assert swing.rest.frequency_hz == pytest.approx(cycles.stick_slip.frequency_hz, rel=0.03)
+    assert swing.swing_rad == pytest.approx(cycles.stick_slip.output_amplitude_rad, rel=3e-3)
+    assert swing.rest.frequency_hz == pytest.approx(cycles.stick_slip.frequency_hz, rel=3e-3)
 
 
 def test_stick_slip_needs_breakaway_above_friction_and_an_integral() -> None:
@@ -247,15 +266,6 @@ def test_a_feed_forward_of_friction_takes_its_part_of_what_a_reversal_loses(desi
         assert lost.lost_motion_rad == pytest.approx(lost.predicted_rad, rel=1e-6)
         assert lost.predicted_rad < 0.95 * without.predicted_rad
         assert lost.linear_width_rad == pytest.approx(without.linear_width_rad, rel=1e-9)
-
-
-def test_a_stick_slip_cycle_is_not_foreseen_where_a_filter_holds_what_is_not_known() -> None:
-    """A torque filter holds the breakaway torque before the slip, not zero, as it was taken."""
-    assert _slip(AMBER, 1.0, assemble_loops(AMBER)) is not None
-    low_pass = model.Filter(on="torque", kind="lowpass", frequency_rad_s=2000.0)
-    loops = assemble_loops(filtered := changed(AMBER, controller={"velocity": {"filters": (low_pass,)}}))
-    assert any(name.startswith("torque1") for name in loops.tick_system.states)
-    assert _slip(filtered, 1.0, loops) is None
 
 
 def test_a_smoothed_law_is_not_said_to_have_a_threshold() -> None:
