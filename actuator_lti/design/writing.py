@@ -169,7 +169,7 @@ def with_overrides(design: Design, overrides: Mapping[str, Any]) -> Design:
     tree = design_tree(design)
     as_stated(tree, overrides)
     for path, value in overrides.items():
-        _override(tree, path, _plain(value), design)
+        override(tree, path, _plain(value), design)
     return design_from_tree(tree, design.origin or design.name)
 
 
@@ -193,13 +193,6 @@ def with_filter(design: Design, stage: str, keys: Mapping[str, Any]) -> Design:
     there = design_tree(design)["control"]["velocity"].get("filter", [])
     units = with_units(design, {f"{path}.1.{key}": value for key, value in keys.items()})
     return with_overrides(design, {path: [*there, {at.rpartition(".")[2]: one for at, one in units.items()}]})
-
-
-def overridden_text(design: Design, path: str, value: Any) -> str:
-    """The design file with one key changed as `with_overrides` does, without a look at the value."""
-    tree = design_tree(design)
-    _override(tree, path, value, design)
-    return tomli_w.dumps(tree)
 
 
 def with_units(design: Design, values: Mapping[str, Any]) -> Tree:
@@ -257,7 +250,8 @@ def value_as_stated(design: Design, path: str, value: float) -> str:
     return f"{value / per_SI:.4g} {unit_words(unit)}".rstrip()
 
 
-def _override(tree: Tree, path: str, value: Any, design: Design) -> None:
+def override(tree: Tree, path: str, value: Any, design: Design) -> None:
+    """Change one key in the tree of a design's file, without a look at the value; ``None`` takes it out."""
     parts = path.split(".")
     here: Any = tree
     lists = [section.path for section in TABLES if section.many]
@@ -280,7 +274,12 @@ def _override(tree: Tree, path: str, value: Any, design: Design) -> None:
     old = here.get(parts[-1])
     if isinstance(old, dict) and "value" in old and not isinstance(value, Mapping):
         kept = {"tolerance": old["tolerance"]} if "tolerance" in old and not _width_gone(old, value) else {}
-        value = {"value": value, "source": f"changed from {old['value']}", **kept}
+        said = {"source": f"changed from {old['value']}"} if len(old) > 1 else {}
+        made = {"value": value, **said, **kept}
+        for gone in old.keys() - made.keys():
+            del old[gone]
+        old.update(made)  # in its place: a text keeps its layout
+        return
     here[parts[-1]] = value
 
 

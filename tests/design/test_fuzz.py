@@ -27,7 +27,7 @@ from actuator_lti.design.access import unit_in_file
 from actuator_lti.design.field import BIG, Field, Structure
 from actuator_lti.design.fields import FIELDS, field_of, template_of
 from actuator_lti.design.loader import design_from_tree
-from actuator_lti.design.writing import _override
+from actuator_lti.design.writing import override
 from actuator_lti.errors import InputError
 from tests.validation.random_drives import full_drive
 
@@ -106,7 +106,7 @@ def _with(tree: Any, values: dict[str, Any], design: Design) -> Any:
     grown = copy.deepcopy(tree)
     try:
         for path, value in values.items():
-            _override(grown, path, value, design)
+            override(grown, path, value, design)
         design_from_tree(grown, "any")
     except InputError:
         return None

@@ -8,7 +8,7 @@ from test_fuzz import leaves
 
 from actuator_lti.design import design_tree, load_design
 from actuator_lti.design.loader import design_from_tree, design_text
-from actuator_lti.design.writing import _override
+from actuator_lti.design.writing import override
 from actuator_lti.errors import InputError, Mistakes
 from analyses.studies.study import load_study
 from tests.refusals import mistakes
@@ -64,7 +64,7 @@ def contradicted() -> Any:
     tree = design_tree(AMBER)
     for written, *_ in RELATIONS:
         for path, value in written.items():
-            _override(tree, path, value, AMBER)
+            override(tree, path, value, AMBER)
     del tree["control"]["position"]["gain"]
     assert _told(tree) == {path for _, path, _ in RELATIONS}
     with pytest.raises(Mistakes) as caught:
