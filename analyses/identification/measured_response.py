@@ -80,7 +80,8 @@ def identify_response(
     model, grows = loop_model(start, loop, of, measured)
     known = bool(np.all(np.isfinite(measured.deviation) & (measured.deviation > 0.0)))
     size = np.abs(measured.response) * (measured.deviation / np.sqrt(2.0) if known else 1.0)
-    seen = Seen(measured=measured.response, size=size, known=known, model=model, grows=grows)
+    alike = not known or bool(np.ptp(measured.deviation) == 0.0)
+    seen = Seen(measured=measured.response, size=size, known=known, alike=alike, model=model, grows=grows)
     held = {key: Fixed(value=value, reason="fixed as asked") for key, value in (fixed or {}).items()}
     if start.load.inertia_kgm2 == 0.0:
         held.setdefault("load.inertia", Fixed(value=0.0, reason="0 in the design: kept"))

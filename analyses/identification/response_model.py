@@ -30,12 +30,15 @@ ROUNDED = float(np.finfo(float).eps) ** 0.25  # how far rounding scatters four e
 class Seen:
     """A measured response, shape (F,), the deviation of each of its parts (1: not known), and the model.
 
+    ``alike``: the deviation is one share of each true value. Over the measured one it would have too much
+    weight where noise made it small, and the values a bias; the logarithm has a mean of 0 of such noise.
     ``grows``: of which designs more modes grow than of the first: nobody measures them.
     """
 
     measured: Complexes
     size: Floats
     known: bool
+    alike: bool
     model: Callable[[Values], Complexes]
     grows: Callable[[Values], Mask]
 
@@ -45,7 +48,7 @@ class Seen:
 
     def off(self, values: Values) -> Floats:
         """What the responses of designs are off by, shape (K, 2 F)."""
-        return self.parts(self.model(values) - self.measured)
+        return self.ratio(values) if self.alike else self.parts(self.model(values) - self.measured)
 
     def ratio(self, values: Values) -> Floats:
         """The same of the logarithms: far from the truth they are straighter."""
