@@ -5,9 +5,10 @@ added to the command with the sign ``s`` (-1: negative feedback), the loop is br
 
     L = -s G T,   the command is  r + s G y.
 
-In the sampled form the command is held over ``k`` updates of the drive's outermost loop, and the outer loop
-reads ``y`` at these instants; both are exact.  A continuous G becomes the sampled system that takes ``y`` as
-held over its period. Read from a JSON file: coefficients or matrices, sampling, sign, names.
+In the sampled form the command is held over ``k`` updates of the drive's outermost loop, which takes the mean
+of the last of them where its jerk is limited, and the outer loop reads ``y`` at these instants; all are
+exact.  A continuous G becomes the sampled system that takes ``y`` as held over its period. Read from a JSON
+file: coefficients or matrices, sampling, sign, names.
 """
 
 from collections.abc import Callable, Mapping
@@ -19,6 +20,7 @@ from typing import Any
 import control
 import numpy as np
 
+from actuator_lti.drive.profile import command_mean
 from actuator_lti.drive.signals import SIGNALS
 from actuator_lti.drive.wiring import COMMANDS
 from actuator_lti.errors import InputError
@@ -48,7 +50,8 @@ def loop_around(loops: Loops, outer: OuterLoop) -> Loop:
     """The loop of an outer system around a drive, broken at the drive's command.
 
     Raises `InputError`: for a sampled system around continuous loops, one without a sampling period around
-    sampled ones, or a period that is no whole multiple of that of the drive's outermost loop.
+    sampled ones, a period that is no whole multiple of that of the drive's outermost loop, or a mean of the
+    command's samples in a form that has none.
 
     >>> import control
     >>> from actuator_lti import assemble_loops
@@ -57,11 +60,15 @@ def loop_around(loops: Loops, outer: OuterLoop) -> Loop:
     Loop(roll rate, broken at command, in rad, every 1 ms)
     """
     drive, system, period = loops.reference_to_output, outer.system, None
+    mean = command_mean(loops.design)
     if drive is None:
         raise InputError("--around: these loops have no response to a command", where=loops.design.name)
     if loops.form == "sampled":
         system, period = _sampled(outer, float(drive.dt))
-        drive = held(control.ss(drive), round(period / float(drive.dt)))
+        drive = held(control.ss(drive), round(period / float(drive.dt)), 1 if mean is None else mean.samples)
+    elif mean is not None:
+        what = f"command.jerk: the mean of {mean.samples} samples that it makes of the command"
+        raise InputError(f"{what} is a sampled one; allowed with --around: --form sampled", where=outer.name)
     elif not outer.continuous:
         message = f"dt: a sampled outer loop; allowed with --form {loops.form}: a continuous one (dt = 0)"
         raise InputError(message, where=outer.name)
@@ -91,13 +98,19 @@ def _sampled(outer: OuterLoop, drive_s: float) -> tuple[control.StateSpace, floa
     return outer.system, period
 
 
-def held(system: control.StateSpace, times: int) -> control.StateSpace:
-    """A sampled system at every ``times``-th instant, its input held in between."""
-    if times == 1:
-        return system
-    n = len(system.A)
-    whole = np.linalg.matrix_power(np.block([[system.A, system.B], [np.zeros((1, n)), np.eye(1)]]), times)
-    return control.ss(whole[:n, :n], whole[:n, n:], system.C, system.D, times * system.dt)
+def held(system: control.StateSpace, times: int, mean: int) -> control.StateSpace:
+    """A sampled system at every ``times``-th instant, behind a mean of samples of its input, held so long.
+
+    Its states are followed by the inputs before this one that the mean still takes, the last first.
+    """
+    older, ages = -(-(mean - 1) // times), np.arange(mean)
+    shares = [np.bincount(-((j - ages) // times), minlength=older + 1) / mean for j in range(times)]
+    A, B = np.eye(len(system.A)), np.zeros((len(system.A), older + 1))
+    for share in shares:
+        A, B = system.A @ A, system.A @ B + system.B * share
+    whole = np.block([[A, B[:, 1:]], [np.zeros((older, len(A))), np.eye(older, k=-1)]])
+    first, direct = np.vstack([B[:, :1], np.eye(older, 1)]), system.D * shares[0]
+    return control.ss(whole, first, np.hstack([system.C, direct[:, 1:]]), direct[:, :1], times * system.dt)
 
 
 COEFFICIENTS, MATRICES = ("num", "den"), ("A", "B", "C", "D")

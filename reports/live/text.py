@@ -55,7 +55,10 @@ def _patch(design: Design, path: str, text: str) -> Patch:
     (_, first, _, begins, _), (_, _, last, _, ends) = edits[0], edits[-1]
     begin, end = (sum(map(len, old[:line])) for line in (first, last))
     before, _, after = "".join(new[begins:ends]).partition(f'"{MARK}"')
-    if begin == end and "[" in before:  # a table that is not there: the key stands before all tables
+    table, _, key = path.rpartition(".")
+    if begin == end and (head := re.search(rf"(?m)^\[{re.escape(table)}\].*\n", text)):  # a key that is new
+        return head.end(), head.end(), f"{key} = ", "\n"
+    if begin == end and "[" in before:  # in a table that is not there: with its whole path before all others
         begin = end = len(re.split(r"(?m)^\[", text)[0])
         before = f"{path} = "
     return begin, end, before, after

@@ -165,6 +165,9 @@ def test_only_the_entry_of_a_changed_key_is_written_anew(name: str) -> None:
         assert parameter_value(other, key["path"]) == pytest.approx(wanted, rel=1e-12)
         lines = difflib.unified_diff(text.splitlines(), made.splitlines(), lineterm="", n=0)
         lost = [line for line in lines if line.startswith("-")][1:]
+        head = re.search(rf"(?m)^\[{re.escape(key['path'].rpartition('.')[0])}\].*\n", text)
+        # a new one stands away from what is said of the next table
+        assert place[0] < place[1] or head is None or place[0] == head.end()
         assert len(lost) <= 4  # value, source and grade of its table
         assert [line for line in lost if "#" in line] == [] or len(lost) == 1
         assert len(re.findall(r"#[^\n]*", made)) == len(re.findall(r"#[^\n]*", text))
