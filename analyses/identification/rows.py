@@ -44,7 +44,7 @@ def recipe_for(record: Record, cutoff_hz: float | None = None, decimation: int |
 
     100 Hz or a tenth of the sampling frequency, whichever is lower; decimated to the cut-off; 49 ms dropped
     at both ends; differences over seven points, as three would make the inertia too small by some tenths of a
-    per cent; torques filtered as the position is. The record of the EMPS benchmark itself has the published recipe.
+    per cent; torques filtered as the position is. The EMPS benchmark itself has the published one.
     """
     period = period_of(record)
     usual = min(100.0, 0.1 / period)
@@ -61,7 +61,7 @@ def recipe_for(record: Record, cutoff_hz: float | None = None, decimation: int |
 
 
 def is_benchmark(record: Record) -> bool:
-    """Whether a record is that of the EMPS benchmark, to the last digit: of no other are figures published."""
+    """Whether a record is that of the EMPS benchmark, to the last digit: no other has published figures."""
     if "gtau" not in record.constants:
         return False
     told = np.concatenate([record[name] for name in ("position", "force") if name in record.signals])
