@@ -256,7 +256,7 @@ def result(figures: Mapping[str, LoopFigures]) -> str:
         for words, sound in (("Not stable", False), ("Not known to be stable", None))
         if (names := [LOOPS[name].lower() for name, one in figures.items() if one.sound is sound])
     ]
-    if doubts:
+    if doubts or not figures:
         return " ".join(doubts)
     rows = {loop_words(name, one.rotor).lower(): margin_row(one.judged) for name, one in figures.items()}
     words = []
