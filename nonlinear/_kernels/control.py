@@ -9,10 +9,14 @@ KERNELS = True
 
 
 def overload(p, s, i):
-    """The overload (I2t) state, and the current limit of this tick."""
-    x, share = s[layout.S_OVERLOAD], i / p[layout.CONTINUOUS_CURRENT]
-    x += p[layout.OVERLOAD_RATE] * (share * share - x)
-    s[layout.S_OVERLOAD] = x
+    """The overload (I2t) state, and the current limit of this tick.
+
+    A tick adds less than single precision holds beside 1: what rounding leaves over is added to the next.
+    """
+    before, share = s[layout.S_OVERLOAD], i / p[layout.CONTINUOUS_CURRENT]
+    more = p[layout.OVERLOAD_RATE] * (share * share - before) + s[layout.S_OVERLOAD_REST]
+    x = before + more
+    s[layout.S_OVERLOAD], s[layout.S_OVERLOAD_REST] = x, more - (x - before)
     if x >= 1.0:
         s[layout.S_OVERLOADED] = 1.0
     elif x < p[layout.OVERLOAD_RELEASE]:

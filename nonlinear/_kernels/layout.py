@@ -360,6 +360,7 @@ S_AVERAGE_SUM: Continuous = next(_places)
 S_CURRENT_LIMIT: Flag = next(_places)  # of this tick [A]
 S_VOLTAGE_LIMIT: Continuous = next(_places)  # [V]
 S_OVERLOAD: Continuous = next(_places)
+S_OVERLOAD_REST: Note = next(_places)  # that the sum of the overload has left over
 S_OVERLOADED: Flag = next(_places)
 S_EVENTS: Counter = next(_places)  # in all
 S_MAX_EVENTS: Counter = next(_places)  # most in one tick

@@ -139,10 +139,11 @@ def rounding_bounds(ours: Controller, vectors: list[Vector], *, single_precision
     scale, of_counts = (1.0, _DOUBLE) if single_precision else (_DOUBLE, 1.0)
     places = [_places(struct, each) for struct in (ours.out, ours.state) for each in struct.members]
     read = np.concatenate(places)
+    size = np.where(read == at.S_OVERLOAD_REST, at.S_OVERLOAD, read)  # a sum's rest: of the sum's rounding
     worst = np.zeros(read.size)
     for vector in vectors:
-        plain = after(ours, vector)[read]
-        total = _MOVE * np.abs(plain)
+        plain = after(ours, vector)
+        total, plain = _MOVE * np.abs(plain[size]), plain[read]
         for moved, weight in _moved(ours, vector, of_counts):
             total += weight * np.abs(after(ours, moved)[read] - plain)
         worst = np.maximum(worst, roundings(ours) * scale * total)

@@ -82,6 +82,7 @@ class Scales:
         if self._p[at.HAS_POSITION] > 0.0:
             self._by_angle()
         states[at.S_TRACKED_ERROR] = states[at.S_ANGLE]  # a difference of angles
+        states[at.S_OVERLOAD_REST] = states[at.S_OVERLOAD]
         states[_STATES] = np.maximum(states[_STATES], signals[_SIGNALS])
         queue = slice(at.S_QUEUE, at.S_QUEUE + int(self._p[at.DELAY_LINE]))
         states[queue] = np.maximum(states[queue], signals[_VOLTAGE])

@@ -121,6 +121,21 @@ def test_a_law_of_one_s_own_has_the_simulator_s_bits(stage: str, order: int, tmp
     assert f"law_states[{order}];" in header or not order
 
 
+@pytest.mark.parametrize("above", [1e-3, 5e-3])
+def test_single_precision_adds_up_an_overload_of_a_per_mille(above: float, tmp_path: Path) -> None:
+    """x goes to (i/i_cont)^2 by T/tau of the way a tick: a millionth of it was less than half an ulp of x."""
+    limits = {"limits.continuous_current": "4 A", "limits.peak_current": "12 A", "limits.peak_time": "2 s"}
+    design = with_overrides(load_design("ilr33-amber"), limits)
+    written(tmp_path, design, single=True)
+    square, part = (1.0 + above) ** 2, design.controller.period_s * np.log(9.0 / 8.0) / 2.0
+    (tmp_path / "long.c").write_text(
+        (PROGRAMS / "long.c").read_text().replace("CURRENT", f"{4 + 4 * above}f")
+    )
+    assert float(said_by(tmp_path, "long.c")) == pytest.approx(
+        np.log1p(-1 / square) / np.log1p(-part), rel=1e-3
+    )
+
+
 def test_a_coefficient_that_is_off_is_seen(tmp_path: Path) -> None:
     folder = written(tmp_path, load_design("ilr33-amber"), single=False)
     source = (folder / "controller.c").read_text()
