@@ -16,7 +16,7 @@ from analyses.correlation.between_ticks import likeliest_s, signals_at
 from analyses.correlation.compare import SignalComparison, compare_signals
 from analyses.correlation.following import Followed, followed, following_finding
 from analyses.records.consistency import Finding, because, check_record
-from analyses.records.differentiation import filtered_motion
+from analyses.records.differentiation import filtered_motion, lowest_cutoff_hz
 from analyses.records.inputs import InputUse, account, lacking
 from analyses.records.naming import KNOWN_UNITS, LOADS
 from analyses.records.record import Record, period_of, prepared
@@ -71,9 +71,10 @@ def correlate_record(
     ``command``, where ``"voltage"`` is the measured voltage of the motor. A ``torque`` signal is the load
     torque at the output, ``supply`` the bus voltage (see `driving.supply_of`).
 
-    Compared are, where recorded: angle, output_angle or position, speed or velocity (else the position's
-    derivative: 4th-order Butterworth at 100 Hz forward and backward, central differences), current,
-    voltage, force. The force of a drive with an ideal source is its gain times the voltage.
+    Compared are, where recorded: angle, output_angle or position, speed or velocity (else the derivative of
+    either position: 4th-order Butterworth at 100 Hz, or the lowest that a short record allows, forward and
+    backward, central differences), current, voltage, force. The force of a drive with an ideal source is its
+    gain times the voltage.
 
     Raises `InputError`: if the record holds no command, or nothing to compare.
     """
@@ -81,14 +82,17 @@ def correlate_record(
     design = record.drive(as_design(design))
     notes = list(record.notes)
     findings = check_record(design, record)
-    measured = measured_signals(design, record, True, notes)
-    measured.pop(command or "", None)
-    if not measured:
-        known = ", ".join(AXIS_SIGNALS[design.axis])
-        raise lacking(record, f"nothing to compare; known signals: {known}")
     with because({record.name: findings}):
+        measured = measured_signals(design, record, True, notes)
+        measured.pop(command or "", None)
+        if not measured:
+            known = ", ".join(AXIS_SIGNALS[design.axis])
+            raise lacking(record, f"nothing to compare; known signals: {known}")
         driven, run, series = nearest_run(design, record, measured, progress, command)
     modelled = {name: series[name] for name in measured}
+    for rate in {"speed", "velocity"} & measured.keys() - record.signals.keys():
+        place = next(name for name in ("angle", "output_angle", "position") if name in measured)
+        modelled[rate] = _rate_of(design, place, modelled[place], record.period_s)[0]
     if (follows := with_zero(design, record, followed(design, record, modelled, command))) is not None:
         findings += (following_finding(design, follows),)
     outermost = driven.stage == design.controller.outermost
@@ -132,12 +136,17 @@ def measured_signals(
         result["force"] = gain * result["voltage"]
         notes.append(f"measured force: {gain:g} N/V times the recorded voltage")
     if derive and rate not in result and place in result:
-        cutoff = min(VELOCITY_CUTOFF_HZ, 0.2 / record.period_s)
-        motion = filtered_motion(result[place], record.period_s, cutoff_hz=cutoff, order=4)
-        ratio = design.total_ratio if place == "output_angle" else 1.0
-        result[rate] = ratio * motion.velocity
-        notes.append(f"measured {rate}: derivative of the {place}, filtered at {cutoff:g} Hz without phase")
+        result[rate], cutoff = _rate_of(design, place, result[place], record.period_s)
+        notes.append(f"{rate}: derivative of either {place}, filtered at {cutoff:.4g} Hz without phase")
     return result
+
+
+def _rate_of(design: Design, place: str, values: Floats, period_s: float) -> tuple[Floats, float]:
+    """The motor's speed, or a linear axis's, by a place, and the cut-off: as low as so few rows allow."""
+    cutoff = max(VELOCITY_CUTOFF_HZ, lowest_cutoff_hz(len(values), period_s, 4))
+    cutoff = min(cutoff, 0.2 / period_s)
+    motion = filtered_motion(values, period_s, cutoff_hz=cutoff, order=4)
+    return motion.velocity * (design.total_ratio if place == "output_angle" else 1.0), cutoff
 
 
 def model_signals(design: Design, record: Record, measured: Mapping[str, Floats]) -> dict[str, Floats]:

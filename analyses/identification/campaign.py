@@ -17,7 +17,7 @@ from analyses.identification.richer import RicherLaws, compare_laws
 from analyses.identification.surface import NAMES, SurfaceFit, fit_surface
 from analyses.identification.verdict import Item, kept_items, residual_item, simulated_item, size_item
 from analyses.records.campaign_import import ImportedCampaign, ImportedRun, SetAside
-from analyses.records.consistency import Finding, check_record, wrong_of
+from analyses.records.consistency import SURE, Finding, check_record, wrong_of
 from analyses.records.factors import named_factor
 from analyses.records.inputs import InputUse
 from analyses.records.steady_window import CRITERION, SteadyCriterion
@@ -143,7 +143,8 @@ def check_run(
 ) -> Iterator[Finding]:
     """Hold a run against its set speed and load, itself, and the design's limits.
 
-    The speed may be off by 5 % of its setting, the load by 10 % and twice the sensor's accuracy.
+    The speed may be off by 5 % of its setting, the load by 10 % and twice the sensor's accuracy. Friction
+    takes power in steady motion.
     """
     speed, load = abs(run.entry.speed_rad_s or 0.0), abs(run.entry.load_Nm or 0.0)
     tools = imported.campaign.instruments
@@ -157,6 +158,12 @@ def check_run(
             passed, factor = abs(ratio - 1.0) <= allowed, named_factor(ratio)
             text += "" if passed else f": {ratio:.4g} times" + (f", factor {factor}" if factor else "")
             yield Finding(subject=f"set {what}", passed=passed, text=text)
+    least = (design.effective_motor.torque_constant_Nm_A or 0.0) * tools.current_offset_A
+    least += SURE * float(np.sqrt(point.covariance[0, 0]))
+    if point.torque_Nm < -least and (design.load.path == "self-locking" or not point.load_Nm):
+        told = f"{point.torque_Nm:.4g} N m with the motion, where friction alone acts against it"
+        text = f"the sign of the current is turned, or that of the speed: kM i is {told}"
+        yield Finding(subject="current against the motion", passed=False, text=text)
     yield from check_record(design, run.record)
     for other in imported.runs:
         if other is not run and run.sensor_file and run.sensor_file == other.sensor_file:

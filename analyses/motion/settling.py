@@ -21,7 +21,7 @@ from analyses.large_signal.tones import TANH_TOLERANCE, full_command
 from analyses.limit_cycles.stick_slip import stick_slip_cycle
 from nonlinear.rows import Rows
 from nonlinear.runs.trajectory import COMMAND_UNITS, Trajectory
-from nonlinear.settling.rest import Rest, judge
+from nonlinear.settling.rest import MOST_WORK, Rest, judge
 
 SMALL = 1e-3  # of full deflection: a step beside those that the design asks for
 NEAR = 0.02  # of the largest value: a run that ends within it has settled
@@ -74,14 +74,21 @@ def counted(rest: Rest, least: float) -> Rest:
 
 
 @lru_cache(maxsize=256)
-def settle(design: Design, load_Nm: float, step_rad: float) -> Settling:
+def settle(design: Design, load_Nm: float, step_rad: float, *, standing: bool = False) -> Settling:
     """Step and wait, once for all who ask; the command is of the position loop.
+
+    ``standing``: the step does not come with the load, but when the drive stands under it, if it ever does.
 
     >>> from actuator_lti.design import load_design
     >>> settle(load_design("ilr33-amber"), 8.0, 0.01).rest.verdict
     'at rest'
     """
-    rest = judge(step_rows(design, load_Nm, step_rad).running())
+    drive = step_rows(design, load_Nm, 0.0 if standing else step_rad).running()
+    rest = judge(drive)
+    if standing and rest is not None and rest.comes_to_rest:
+        drive.run(min(round(rest.after_s / design.controller.period_s), MOST_WORK))
+        drive.command(step_rad)
+        rest = judge(drive)
     assert rest is not None  # a step and a load that stay
     return Settling(step_rad, load_Nm, rest)
 
@@ -94,9 +101,9 @@ def step_rows(design: Design, load_Nm: float, step_rad: float, *, limits_on: boo
     return rows
 
 
-def outcome(design: Design, load_Nm: float, step_rad: float) -> Settling:
+def outcome(design: Design, load_Nm: float, step_rad: float, *, standing: bool = False) -> Settling:
     """What a step ends in as it counts: `settle`, and swings that are too small are rest."""
-    one = settle(design, load_Nm, step_rad)
+    one = settle(design, load_Nm, step_rad, standing=standing)
     return replace(one, rest=counted(one.rest, NOTICED * full_command(design)))
 
 
@@ -108,7 +115,8 @@ def settlings_of(
 ) -> tuple[Settling, ...]:
     """What steps of the drive as it is end in, small to full, without load and at every named one.
 
-    One is as large as a predicted stick-slip cycle: larger steps may slide to rest where it goes on for ever.
+    One is as large as a predicted stick-slip cycle, from rest under the load: others may slide to rest where
+    it goes on for ever.
     The largest is asked first. One that does not come to rest fails the drive, whatever smaller steps do, and
     they are not asked at this load; where a requirement accepts a swing all are, as the largest counts.
 
@@ -124,7 +132,8 @@ def settlings_of(
         slip, there = stick_slip_cycle(design, load, loops), list[Settling]()
         whole = sizes if slip is None else {*sizes, slip.output_amplitude_rad}
         for size in sorted(whole, reverse=True):
-            there.append(resting.get((load, size)) or outcome(design, load, size))
+            own = size not in sizes
+            there.append(resting.get((load, size)) or outcome(design, load, size, standing=own))
             failed = verdict_of(design, noticed(design, there[-1:])) is Verdict.NOT_MET
             if failed and accepted(design) is None:  # the verdict of the load is known
                 break

@@ -73,13 +73,18 @@ def low_pass(values: Floats, period_s: float, *, cutoff_hz: float, order: int) -
         raise InputError(f"{told}; allowed: fewer rows or a higher cut-off")
     if len(values) <= 3 * order:
         raise InputError(f"{len(values)} samples: more than {3 * order} are needed; allowed: a longer record")
-    lowest_hz = 0.3 * order / ((len(values) - 1) * period_s)
     padding = round(3 * order * max(1.0, 0.1 / (cutoff_hz * period_s)))
     if len(values) <= padding:
         told = f"its filter remembers {padding} rows, and there are {len(values)}; allowed:"
-        raise InputError(f"cutoff = {cutoff_hz:g} Hz: {told} {lowest_hz:.6g} Hz and more, or more rows")
+        lowest = f"{lowest_cutoff_hz(len(values), period_s, order):.6g} Hz and more, or more rows"
+        raise InputError(f"cutoff = {cutoff_hz:g} Hz: {told} {lowest}")
     b, a = butterworth(order, 2.0 * cutoff_hz * period_s)
     return np.asarray(filtfilt(b, a, values, padlen=padding), dtype=np.float64)
+
+
+def lowest_cutoff_hz(rows: int, period_s: float, order: int) -> float:
+    """The cut-off whose filter remembers as much as so many rows are."""
+    return 0.3 * order / ((rows - 1) * period_s)
 
 
 def decimated(columns: Floats, factor: int) -> Floats:

@@ -172,6 +172,7 @@ def _breakaways(design: Design, model: Design) -> Iterator[Row]:
         twist, middle, ahead, back = _at_rest(model, load)
         if ahead + back <= 2.0 * _weight_rounding(model):
             continue
+        span = max(ahead, back)  # one of them may be none
         rows["load"], rows["twist_start"] = load, twist
         rows["angle_start"], rows["voltage_start"] = design.ratio_to_coupling * twist, middle
         drive = rows.running()
@@ -183,8 +184,8 @@ def _breakaways(design: Design, model: Design) -> Iterator[Row]:
                 turned = drive.value("ANGLE") - drive.start_value("ANGLE")  # it may stand again by now
                 return drive.value("SPEED") * side > 0.0 or turned * side > 0.0
 
-            found = edge(moves, wanted, side * BESIDE * held, wanted + side * 0.5 * held)
-            allowed = WITHIN * held + EXACT * (abs(middle) + held) + _weight_rounding(model)
+            found = edge(moves, wanted, side * BESIDE * span, wanted + side * 0.5 * span)
+            allowed = WITHIN * held + EXACT * (abs(middle) + span) + _weight_rounding(model)
             allowed += _spring_rounding(model, twist)
             yield judged("breakaway_torque", "drive", wanted, found, allowed, unit=unit,
                          condition=f"at rest under {load:g} {unit}, {WAYS[side]}")  # fmt: skip

@@ -135,9 +135,11 @@ def _structure(root: ET.Element, variables: Sequence[Variable], version: int) ->
         part = ET.SubElement(structure, f"{name}s") if version == 2 else structure
         tag, key = ("Unknown", "index") if version == 2 else (name, "valueReference")
         for item in (item for item in variables if item.causality == "output"):
-            started = name == "InitialUnknown" and item.name in ("output.angle", "motor.angle")
-            text = str(place[INITIAL_ANGLE]) if started else ""
-            ET.SubElement(part, tag, {key: str(place[item.reference])}, dependencies=text)
+            started = name == "InitialUnknown" and item.name == "output.angle"
+            known = {"dependencies": str(place[INITIAL_ANGLE]) if started else ""}
+            if name == "InitialUnknown" and item.name == "motor.angle":
+                known = {}  # not said: of every parameter, as the gears' ratios are
+            ET.SubElement(part, tag, {key: str(place[item.reference]), **known})
 
 
 def build_description(sources: Sequence[str]) -> bytes:

@@ -172,7 +172,8 @@ def _settling_table(result: FrictionEffects, fine: Unit, load: str) -> doc.Block
     ends = [(point.load_Nm, one) for point in result.points for one in point.cycles.settlings]
     note = (
         "At each load steps from small to full deflection; where stick and slip is predicted, one of its "
-        f"size as well. {FROM_THE_LARGEST} Errors below 10⁻⁶ of the step are shown as 0."
+        f"size as well, from rest under the load. {FROM_THE_LARGEST} Errors below 10⁻⁶ of the step are "
+        "shown as 0."
     )
     if quiet(result.design) != result.design:
         note += " Where the drive comes to rest with its counts, it is not simulated again without them."

@@ -129,15 +129,16 @@ def _named(result: Margins) -> dict[str, LoopFigures]:
 
 
 def _below_custom(result: Margins) -> str:
-    """Of a design without requirements: margins below what is customary, which nothing else would name."""
-    low = []
-    for name, one in result.loops.items():
+    """Margins below what is customary that no requirement names: without any, and of a loop around it."""
+    low, judged = [], bool(result.requirements)
+    for name, one in (result.around if judged else _named(result)).items():
         for quantity, value in figures_of(one.judged.margins).items() if one.sound else ():
             if value < (usual := CUSTOMARY[quantity]):
                 of = QUANTITIES[quantity]
                 unit = f" {unit_words(of.unit)}".rstrip()
-                low.append(f"{LOOPS[name].lower()}, {of.words} {value:.3g}{unit} (of {usual:g}{unit})")
-    return f" Below what is customary: {'; '.join(low)}." if low and not result.requirements else ""
+                own = name if name in result.around else name.lower()
+                low.append(f"{own}, {of.words} {value:.3g}{unit} (of {usual:g}{unit})")
+    return f" Below what is customary: {'; '.join(low)}." if low else ""
 
 
 def _where(result: Margins) -> str:
@@ -255,7 +256,7 @@ def result(figures: Mapping[str, LoopFigures]) -> str:
         for words, sound in (("Not stable", False), ("Not known to be stable", None))
         if (names := [LOOPS[name].lower() for name, one in figures.items() if one.sound is sound])
     ]
-    if doubts:
+    if doubts or not figures:
         return " ".join(doubts)
     rows = {loop_words(name, one.rotor).lower(): margin_row(one.judged) for name, one in figures.items()}
     words = []

@@ -58,10 +58,12 @@ class Host:
             kind = {"Real": "Float64", "Integer": "Int32"}[kind]
         return getattr(self.unit, verb + kind)([self.references[name] for name in names], *more)
 
-    def start(self, **values: float) -> Host:
+    def start(self, stop: float | None = None, begin: float = 0.0, **values: float) -> Host:
         if isinstance(self.unit, fmi2.FMU2Slave):
-            self.unit.setupExperiment()
-        self.unit.enterInitializationMode()
+            self.unit.setupExperiment(startTime=begin, stopTime=stop)
+            self.unit.enterInitializationMode()
+        else:
+            self.unit.enterInitializationMode(startTime=begin, stopTime=stop)
         self.put(values)
         self.unit.exitInitializationMode()
         return self

@@ -79,6 +79,11 @@ def test_parameters_are_the_keys_of_the_design(unit: Path) -> None:
     known = {item.name: item for item in description.modelVariables}
     for path in {*paths_of(design)} - {"limits.voltage"}:  # an input
         assert float(known[structured(path)].start) == parameter_value(design, path), path
+    at_start = {each.variable.name: each.dependencies for each in description.initialUnknowns}
+    assert (
+        at_start["motor.angle"] is None
+    )  # not said, so of all that is known: initial.angle times the ratios
+    assert [each.name for each in at_start["output.angle"]] == ["initial.angle"]
     changes = {"motor.resistance": 0.07, "control.position.gain": 60.0, "friction.dry_torque": 0.003}
     changed = with_values(design, changes)
     result = run(unit, 1e-4, 0.05, {"command": 0.05, **changes})

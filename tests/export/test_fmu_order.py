@@ -69,8 +69,11 @@ def test_calls_out_of_order_are_refused_and_change_nothing(unit: Path) -> None:
         refused(host, "after termination", host.step, 21 * PERIOD, PERIOD)
         refused(host, "after termination", host.put, {"command": 0.0})
         u.reset()
-        host.start(command=0.05).step(0.0, 21 * PERIOD)
+        refused(host, "the stop time before it", host.start, 0.9, 1.0)
+        host.start(22 * PERIOD, command=0.05).step(0.0, 21 * PERIOD)
         assert host.get("output.angle") == [ours.output_angle_rad[21]]
+        refused(host, "past the stop time", host.step, 21 * PERIOD, 1.1 * PERIOD)
+        host.step(21 * PERIOD, PERIOD)
 
 
 def test_the_log_can_be_turned_off_by_its_category(unit: Path) -> None:

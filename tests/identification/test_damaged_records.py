@@ -428,7 +428,7 @@ def test_a_load_friction_of_another_size_fails(factor: float, columns: Columns) 
     assert ("times the design's: factor 1000" in reason) == (factor < 1.0)
 
 
-@pytest.mark.parametrize("added_N", [0.0, 20.0, -5.0])
+@pytest.mark.parametrize("added_N", [0.0, 20.0, -20.0])
 def test_a_constant_force_beside_the_one_stated_is_said(added_N: float, emps_file: Path) -> None:
     """The published axis states -3.16 N; a load that was not recorded comes on top."""
     record = open_record(emps_file)
@@ -445,6 +445,17 @@ def test_a_published_record_in_milliseconds_read_as_seconds_names_the_clock(emps
     result = identify_bench(load_design("emps"), [replace(record, time_s=1e3 * record.time_s)])
     assert not result.passed
     assert "in the clock: factor 1000" in item_of(result, "size").reason
+
+
+def test_a_published_record_whose_force_is_three_rows_late_is_another(emps_file: Path) -> None:
+    """By the benchmark's own recipe no lag was looked for: viscous friction 13 % too large, and passed."""
+    record = open_record(emps_file)
+    late = np.roll(record["force"], 3)
+    late[:3] = late[3]
+    result = identify_bench(load_design("emps"), [replace(record, signals={**record.signals, "force": late})])
+    (told,) = (one.text for one in result.findings[record.name] if "at one time" in one.subject)
+    assert float(re.search(r"(\S+) ms", told)[1]) == pytest.approx(3.0, abs=0.5)
+    assert abs(result.model["viscous"] - 203.5034) < 1.96 * result.model.std("viscous")  # as published
 
 
 def test_what_is_neither_met_nor_failed_says_why(columns: Columns, right) -> None:

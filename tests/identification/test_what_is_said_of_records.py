@@ -500,6 +500,10 @@ def test_a_right_campaign_is_simulated_again_and_says_what_is_fixed_or_not_told(
     assert kept["CM"] == "no run is loaded: the design's value kept"
     assert fit["parameters"]["C0"]["value"] == pytest.approx(2.25e-3, rel=0.02)
     assert fit["parameters"]["CM"]["value"] == 1.34e-3
+    (folder / "turned.toml").write_text(text.replace('unit = "mA"', 'unit = "mA", scale = -1'))
+    assert "the sign of the current is turned, or that of the speed" in cli.refused(
+        "identify", folder / "turned.toml"
+    )
 
 
 def test_a_drive_that_carries_its_load_is_not_what_the_law_of_a_campaign_says(bench: Path, cli) -> None:

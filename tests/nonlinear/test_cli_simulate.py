@@ -188,7 +188,7 @@ def test_a_drive_without_a_loop_says_so_and_has_corners_and_a_report(tmp_path, c
     assert "Phase margin" not in said[0]
     assert "The drive has no loop at all" in said[1]
     cli.text("report", drive, "--no-validation", "--out", tmp_path)
-    assert (tmp_path / "report.html").exists()
+    assert "loops are" not in (tmp_path / "report.html").read_text()  # "All 0 loops are stable, ."
 
 
 def test_volts_and_amperes(run, tmp_path) -> None:

@@ -96,7 +96,15 @@ def test_the_command_line_judges_it(tmp_path, cli) -> None:
     assert around["stable"] is True
     words = " ".join(cli.text("margins", "ilr33-amber", "--around", path).split())
     assert "roll rate: broken at the command of the drive" in words
-    path.write_text(json.dumps({**AIRFRAME, "num": [30.0 * 10.0 ** (1.1 * around["gain_margin_db"] / 20.0)]}))
+    assert "customary" not in words
+    near, beyond = (
+        json.dumps({**AIRFRAME, "num": [30.0 * 10.0 ** (share * around["gain_margin_db"] / 20.0)]})
+        for share in (0.9, 1.1)
+    )
+    path.write_text(near)
+    words = " ".join(cli.text("margins", "ilr33-amber", "--around", path).split())
+    assert f"Below what is customary: roll rate, gain margin {0.1 * around['gain_margin_db']:.3g} dB" in words
+    path.write_text(beyond)
     around = cli.data("margins", "ilr33-amber", "--around", path, status=1)["around"]["roll rate"]
     assert around["stable"] is False
 

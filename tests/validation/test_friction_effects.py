@@ -214,7 +214,8 @@ HUNTING = {
     "law": as_law(STICKY, "velocity"),
     "position integral": OF_POSITION,
     "law of the position": as_law(OF_POSITION, "position"),
-    "driven by its load": changed(STICKY, load={"path": "back-drivable"}, validation={"loads_Nm": (3.0,)}),
+    "driven by its load": changed(STICKY, load={"path": "back-drivable"}, friction={"load_coefficient": 0.0},
+                                  validation={"loads_Nm": (50.0,)}),
     "offset": changed(STICKY, friction={"offset_torque_Nm": 1e-3}),
 }  # fmt: skip
 

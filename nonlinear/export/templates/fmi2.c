@@ -114,9 +114,7 @@ UNIT_EXPORT fmi2Status fmi2SetupExperiment(
     unit *m = (unit *)c;
     (void)tolerant;
     (void)tolerance;
-    (void)ends;
-    (void)stop;
-    return told(m, unit_set_start(&m->core, start));
+    return told(m, unit_set_times(&m->core, start, (ends != 0) ? stop : UNIT_NO_END));
 }
 
 UNIT_EXPORT fmi2Status fmi2EnterInitializationMode(fmi2Component c)

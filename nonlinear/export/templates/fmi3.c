@@ -120,11 +120,9 @@ UNIT_EXPORT fmi3Status fmi3EnterInitializationMode(
     fmi3Instance c, fmi3Boolean tolerant, fmi3Float64 tolerance, fmi3Float64 start, fmi3Boolean ends, fmi3Float64 stop)
 {
     unit *m = (unit *)c;
-    const char *failed = unit_set_start(&m->core, start);
+    const char *failed = unit_set_times(&m->core, start, (ends != 0) ? stop : UNIT_NO_END);
     (void)tolerant;
     (void)tolerance;
-    (void)ends;
-    (void)stop;
     return told(m, (failed == NULL) ? unit_enter_initialization(&m->core) : failed);
 }
 

@@ -5,7 +5,6 @@
  */
 #include "fmu_core.h"
 
-#include <float.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -25,6 +24,7 @@ void unit_reset(unit_core *m)
         o->keys[j] = fmu_keys[j].value;
     }
     o->inputs[INPUT_SUPPLY] = FMU_SUPPLY_VOLTAGE;
+    o->stop = UNIT_NO_END;
     o->phase = UNIT_INSTANTIATED;
 }
 
@@ -205,16 +205,17 @@ static int get_real(const unit_state *m, unsigned int reference, double *value)
     return 1;
 }
 
-const char *unit_set_start(unit_core *m, double start)
+const char *unit_set_times(unit_core *m, double start, double stop)
 {
     const char *failed = unit_in(m, UNIT_INSTANTIATED);
 
-    if ((failed == NULL) && !isfinite(start)) {
-        failed = "the start time is not finite";
+    if ((failed == NULL) && (!isfinite(start) || !(stop >= start))) {
+        failed = "the start time is not finite, or the stop time before it";
     }
     if (failed == NULL) {
         m->state.start = start;
         m->state.now = start;
+        m->state.stop = stop;
     }
     return failed;
 }
@@ -259,6 +260,7 @@ const char *unit_step(unit_core *m, double now, double step)
     const double until = now + step;
     const double ticks = (until - o->start) / period;
     const double whole = floor(ticks + PART_OF_TICK);
+    const double near = (PART_OF_TICK * period) + (4.0 * DBL_EPSILON * fabs(until)); /* rounding of the host */
     const char *failed = unit_in(m, UNIT_STEPPING);
 
     if (failed != NULL) {
@@ -267,8 +269,11 @@ const char *unit_step(unit_core *m, double now, double step)
     if (!isfinite(until) || !(step > 0.0) || !(whole < 9e15)) {
         return "the communication step is not above 0, or not finite";
     }
-    if (!(fabs(now - o->now) <= (PART_OF_TICK * period) + (4.0 * DBL_EPSILON * fabs(now)))) {
+    if (!(fabs(now - o->now) <= near)) {
         return "the communication step does not begin where the last one ended";
+    }
+    if (until - o->stop > near) {
+        return "the communication step goes past the stop time";
     }
     if (advance(m, until, (int64_t)whole, (ticks - whole > PART_OF_TICK) ? ((ticks - whole) * period) : 0.0) != DRIVE_OK) {
         o->phase = UNIT_FAILED;

@@ -8,11 +8,13 @@
 #include "drive_design.h"
 #include "fmu_design.h"
 
+#include <float.h>
 #include <stddef.h>
 #include <stdint.h>
 
 #define UNIT_INPUTS 3U
 #define UNIT_SPARE 1024
+#define UNIT_NO_END DBL_MAX /* stop time where the host gives none */
 enum { INPUT_COMMAND = 0, INPUT_MOMENT = 1, INPUT_SUPPLY = 2 };
 enum { FIRST_OUTPUT = 10, UNIT_OUTPUTS = 9 };
 
@@ -36,6 +38,7 @@ typedef struct {
     double initial_angle; /* output side */
     double start; /* time of tick 0, s */
     double now; /* the communication point */
+    double stop; /* no step goes past it */
     int64_t ticks; /* ticks done */
     int32_t under_way; /* 1: the next tick has begun, with the inputs that held then */
     int32_t changed; /* 1: a key has another value than p knows; the next tick begins with it */
@@ -64,7 +67,7 @@ typedef struct {
 
 void unit_reset(unit_core *m);
 const char *unit_in(const unit_core *m, int phases); /* whether a call is allowed now */
-const char *unit_set_start(unit_core *m, double start);
+const char *unit_set_times(unit_core *m, double start, double stop);
 const char *unit_enter_initialization(unit_core *m);
 const char *unit_exit_initialization(unit_core *m);
 const char *unit_terminate(unit_core *m);
