@@ -236,20 +236,19 @@ def resonance(count, xs, rs, ss, lead, row, n, h, b, c, work, state, exchanged):
 
 
 def bandwidths(count, xs, rs, ss, dc, lead, row, n, h, b, c, work, state, exchanged):
-    """First fall of |T| below |T(0)|/sqrt 2, and first passage of its phase through -90 degrees."""
-    level = abs(dc)
+    """First fall of |T| below |T(0)|/sqrt 2, and first passage of the phase of T/T(0) through -90 degrees."""
     row[BANDWIDTH_X], row[QUARTER_X] = math.nan, math.nan
-    if not (level > 0.0):
+    if not (abs(dc) > 0.0):
         return
-    k = falls_after(-1, BANDWIDTH, count, xs, rs, ss, level, lead)
+    k = falls_after(-1, BANDWIDTH, count, xs, rs, ss, dc, lead)
     if k < count - 1:
-        x, _r, _i = zero_in(k, BANDWIDTH, xs, rs, ss, level, lead, n, h, b, c, work, state, exchanged)
+        x, _r, _i = zero_in(k, BANDWIDTH, xs, rs, ss, dc, lead, n, h, b, c, work, state, exchanged)
         row[BANDWIDTH_X] = x
-    k = falls_after(-1, QUARTER, count, xs, rs, ss, level, lead)
+    k = falls_after(-1, QUARTER, count, xs, rs, ss, dc, lead)
     while k < count - 1:
         _closed, side = closed_loop(rs[2 * k], rs[2 * k + 1], xs[k], lead)
-        if side < 0.0:
-            x, _r, _i = zero_in(k, QUARTER, xs, rs, ss, level, lead, n, h, b, c, work, state, exchanged)
+        if side * dc < 0.0:
+            x, _r, _i = zero_in(k, QUARTER, xs, rs, ss, dc, lead, n, h, b, c, work, state, exchanged)
             row[QUARTER_X] = x
             break
-        k = falls_after(k, QUARTER, count, xs, rs, ss, level, lead)
+        k = falls_after(k, QUARTER, count, xs, rs, ss, dc, lead)

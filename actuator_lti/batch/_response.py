@@ -172,8 +172,8 @@ def quantity(mode, response_r, response_i, slope_r, slope_i, level, x, lead):
     closed_r, closed_i = closed_loop(response_r, response_i, x, lead)
     size = math.hypot(closed_r, closed_i)
     if mode == BANDWIDTH:
-        return math.log(size / level) + HALF_LOG_2
-    return closed_r / size  # QUARTER
+        return math.log(size / abs(level)) + HALF_LOG_2
+    return closed_r / math.copysign(size, level)  # QUARTER
 
 
 def quantity_at(mode, k, xs, rs, ss, level, lead):

@@ -65,6 +65,7 @@ class Search:
     turn: Floats
     box: Floats  # of the coordinates, shape (2, p)
     ends: Floats  # of the values
+    most: Floats  # how far is searched at once: a slope over the computing delay is that within its tick
     unit: float  # deviation of what is left of the response
 
     @classmethod
@@ -80,7 +81,8 @@ class Search:
         """The search of some values beside others, within what their keys allow."""
         every, n = np.array((*names, *kept)), len(names)
         scale, ends = box_of(start, (*names, *kept))
-        ends[1, every == "control.computing_delay"] = MOST_TICKS * start.controller.period_s
+        late, tick_s = every == "control.computing_delay", start.controller.period_s
+        ends[1, late] = MOST_TICKS * tick_s
         own = np.array([parameter_value(start, key) for key in kept])
         std = own * [own_share(start, key) for key in kept]
         size, turn = np.linalg.eigh(np.outer(std, std) * correlation_of(start, kept))
@@ -97,6 +99,7 @@ class Search:
             turn=block_diag(np.diag(scale[:n]), turn * np.sqrt(np.maximum(size, 0.0))),
             box=box,
             ends=ends,
+            most=np.where(late, tick_s / scale, np.inf),
             unit=unit,
         )
 
@@ -134,24 +137,31 @@ class Search:
     def least(self, begin: Point, *, enough: float = FINE, hold: int | None = None) -> Point:
         """The least sum of squares near a point, in the box, one coordinate of which may be held.
 
-        By a dogleg in the box (scipy). It ends where a step saves less than a part ``enough`` of what is
-        left: the values are off by as little of their errors (Bates and Watts, Technometrics 23, 1981).
+        By a trust region (scipy), within a tick of the computing delay and then from there. It ends
+        where a step saves less than a part ``enough`` of what is left: the values are off by as little of
+        their errors (Bates and Watts, Technometrics 23, 1981).
         """
-        free = np.arange(len(begin.x)) != hold
+        here, free = begin, np.arange(len(begin.x)) != hold
 
         def at(part: Floats) -> Floats:
-            x = begin.x.copy()
+            x = here.x.copy()
             x[free] = part
             return x
 
         def slopes(part: Floats) -> Floats:
             return self.at(at(part)).slopes[:, free]
 
-        if not (free.any() and np.isfinite(begin.cost) and np.isfinite(begin.slopes).all()):
-            return begin
-        options = {"method": "dogbox", "x_scale": "jac", "ftol": enough, "xtol": None, "gtol": None}
-        found = least_squares(
-            lambda part: self.off(at(part)[None])[0],
-            begin.x[free], slopes, self.box[:, free], max_nfev=ROUNDS, **options,
-        )  # fmt: skip
-        return self.at(at(found.x))
+        options = {"x_scale": "jac", "ftol": enough, "gtol": None}
+        for _ in range(ROUNDS if free.any() else 0):
+            if not (np.isfinite(here.cost) and np.isfinite(here.slopes).all()):
+                break
+            near = np.clip(self.box, here.x - self.most, here.x + self.most)[:, free]
+            found = least_squares(
+                lambda part: self.off(at(part)[None])[0],
+                here.x[free], slopes, near, max_nfev=ROUNDS, **options,
+            )  # fmt: skip
+            ended = np.choose(1 + found.active_mask, [near[0], found.x, near[1]])
+            before, here = here, self.at(at(ended))
+            if np.all(np.abs(here.x - before.x) <= 0.5 * self.most):
+                break
+        return here

@@ -1,12 +1,12 @@
 """The sawtooth of the paper: a sine faster than the speed limit, against a pure rate limit's formulas."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from actuator_lti.design.loader import AnyDesign, as_design
-from actuator_lti.design.model import Design
+from actuator_lti.design.model import Command, Design
 from actuator_lti.errors import positive_number
 from analyses.large_signal.classify import FULL_TRIANGLE, RateLimited, rate_limited
 from analyses.large_signal.tones import Tone, tone
@@ -91,9 +91,9 @@ def sawtooth(
     """Simulate a sine of which the output can only follow the flanks, at each load torque of the design.
 
     By default of full deflection, where x = w A/R is three, well inside the range of whole triangles
-    (x >= 1.862).
+    (x >= 1.862). The sine comes behind profile and filter of the command, which would limit it first.
     """
-    design = as_design(design)
+    design = replace(as_design(design), command=Command())
     for name, value in (("amplitude_rad", amplitude_rad), ("frequency_hz", frequency_hz)):
         if value is not None:
             positive_number(name, value)

@@ -219,8 +219,8 @@ def _sawtooth(sawtooth: Sawtooth, out: Unit, load: str) -> doc.Block:
     turns = sawtooth.reversal_deg < 180.0
     becomes = "the output becomes a sawtooth" if turns else "no sawtooth, as it reverses too slowly"
     caption = (
-        f"A sine of {out.of(sawtooth.amplitude_rad)} at {sawtooth.frequency_hz:.3g} Hz, three "
-        f"times faster than the rate limit of {short(limit)} {rate.unit}: {becomes}. "
+        f"A sine of {out.of(sawtooth.amplitude_rad)} at {sawtooth.frequency_hz:.3g} Hz, three times "
+        f"faster than the rate limit of {short(limit)} {rate.unit}, behind any profile: {becomes}. "
         "Simulated values; in brackets those of an ideal rate limit: peak πR/2w, gain 4/(πx), lag "
         "arccos(π/2x)."
     )

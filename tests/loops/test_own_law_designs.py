@@ -187,6 +187,11 @@ def test_the_answer_to_the_command_of_a_law_that_takes_more_than_the_error() -> 
     (ideal,) = all_loop_figures(assemble_loops(mine, form="ideal"), step=False).values()
     s = 1j * ideal.bandwidth.minus3db_rad_s * 1e-3
     assert abs(integral / (s * s + gain * s + integral)) == pytest.approx(0.5**0.5)
+    back = base.with_law("velocity", ([], [], [], [[-1e3 * gain] * 2], 1e-3), ["command", "speed"])
+    (one,), many = all_loop_figures(assemble_loops(back)).values(), linear_figures(Population(back, {}, 1))
+    quarter = np.arccos(1.0 - gain) / (2e-3 * np.pi)  # of -g/(z - 1 + g), by the phase from that at zero
+    found = one.bandwidth.minus90deg_hz, many.quantity("bandwidth_90deg", "velocity")[0]
+    assert found == pytest.approx([quarter] * 2, rel=1e-9)
 
 
 def test_the_page_says_where_the_loop_of_a_law_is_cut_and_whose_step_it_shows() -> None:

@@ -64,10 +64,13 @@ def test_the_regimes_join() -> None:
     assert rate_limited(0.5, 1.0, 1.0).gain == 1.0
 
 
-@pytest.mark.parametrize("x", [2.2, 3.0, 6.0])
-def test_the_formulas_hold_where_loops_and_torque_are_fast(x: float) -> None:
+PROFILE = {"command.rate": 0.02, "command.acceleration": 10.0, "command.filter_time": 0.05}
+
+
+@pytest.mark.parametrize(("x", "profile"), [(2.2, {}), (3.0, {}), (6.0, {}), (3.0, PROFILE)])
+def test_the_formulas_hold_where_loops_and_torque_are_fast(x: float, profile: dict) -> None:
     """A tenth of the speed limit, so that a tenth of the frequency gives the same x: gain 1 %, lag 1 deg."""
-    design = with_values(AMBER, {"limits.speed": 94.25})
+    design = with_values(AMBER, {"limits.speed": 94.25, **profile})
     rate = 94.25 / design.total_ratio
     hz = x * rate / (2.0 * math.pi * design.validation.full_deflection_rad)
     result = sawtooth(design, frequency_hz=hz)
