@@ -15,7 +15,7 @@ class Asked:
     For every signal that both have: relative error, fit, mean, rms and largest error, delay; over several
     records also all together, and the worst; with --out pictures of both and the difference. Where a record
     contradicts itself or the design's limits (a wrong unit, swapped columns, a clock that is off), or a
-    signal is off by more than --error-limit of its motion, beyond its own white noise, the status is 1.
+    signal is off by more than --error-limit of its motion, beyond its own noise, the status is 1.
 
     The outermost command that is recorded drives the model: reference of the output angle, speed, current
     (or torque), or voltage; loops outside it do not act. A recorded supply limits the voltage over time, and

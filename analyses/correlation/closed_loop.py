@@ -89,10 +89,13 @@ def correlate_record(
             known = ", ".join(AXIS_SIGNALS[design.axis])
             raise lacking(record, f"nothing to compare; known signals: {known}")
         driven, run, series = nearest_run(design, record, measured, progress, command)
-    modelled = {name: series[name] for name in measured}
-    for rate in {"speed", "velocity"} & measured.keys() - record.signals.keys():
-        place = next(name for name in ("angle", "output_angle", "position") if name in measured)
-        modelled[rate] = _rate_of(design, place, modelled[place], record.period_s)[0]
+    modelled, uncounted = _as_measured(design, record, measured, series), dict[str, Floats]()
+    if design.angle_quantum_rad or design.output_quantum_rad:
+        motor, output = driven.design.encoder, driven.design.output_encoder
+        motor, output = replace(motor, counts_per_rev=None), replace(output, counts_per_rev=None)
+        bare = replace(driven.design, encoder=motor, output_encoder=output)
+        *_, without = _run_so(replace(driven, design=bare), record, measured, None)
+        uncounted = _as_measured(design, record, measured, without)
     if (follows := with_zero(design, record, followed(design, record, modelled, command))) is not None:
         findings += (following_finding(design, follows),)
     outermost = driven.stage == design.controller.outermost
@@ -103,7 +106,10 @@ def correlate_record(
     if "force" in measured and "force" not in record.signals:
         used["voltage"] = "force, by the source's gain"
     at_s, units = record.time_s, KNOWN_UNITS
-    signals = {n: compare_signals(n, units[n], at_s, own, modelled[n]) for n, own in measured.items()}
+    signals = {
+        name: compare_signals(name, units[name], at_s, own, modelled[name], uncounted.get(name))
+        for name, own in measured.items()
+    }
     return CorrelationResult(
         record=record.name,
         design=design.name,
@@ -139,6 +145,17 @@ def measured_signals(
         result[rate], cutoff = _rate_of(design, place, result[place], record.period_s)
         notes.append(f"{rate}: derivative of either {place}, filtered at {cutoff:.4g} Hz without phase")
     return result
+
+
+def _as_measured(
+    design: Design, record: Record, measured: Mapping[str, Floats], series: Mapping[str, Floats]
+) -> dict[str, Floats]:
+    """The signals of a run that are measured; a rate is taken from the place as that of the record is."""
+    modelled = {name: series[name] for name in measured}
+    for rate in {"speed", "velocity"} & measured.keys() - record.signals.keys():
+        place = next(name for name in ("angle", "output_angle", "position") if name in measured)
+        modelled[rate] = _rate_of(design, place, modelled[place], record.period_s)[0]
+    return modelled
 
 
 def _rate_of(design: Design, place: str, values: Floats, period_s: float) -> tuple[Floats, float]:

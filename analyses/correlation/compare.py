@@ -35,6 +35,7 @@ class SignalComparison:
     # None where the signal does not tell
     delay_s: float | None
     noise_rms: float  # white noise that the measured signal shows from row to row, 0 where it shows none
+    counts_rms: float  # of the difference, what an encoder's counts make at another phase in both
     time_s: Floats = field(repr=False)
     measured: Floats = field(repr=False)
     modelled: Floats = field(repr=False)
@@ -46,14 +47,15 @@ class SignalComparison:
 
     @property
     def left_by_noise(self) -> float:
-        """The part of each error that the measured signal's own white noise does not explain, 0 to 1.
+        """The part of each error that the measured signal's own noise and counts do not explain, 0 to 1.
 
-        As much of the noise counts as there surely is, by chance in so many samples.
+        As much of a white noise counts as there surely is, by chance in so many samples.
         """
-        if not self.noise_rms:
+        if not self.noise_rms and not self.counts_rms:
             return 1.0
         sure = max(1.0 - SURE * np.sqrt(CHANCE / self.samples), 0.0)
-        return float(np.sqrt(max(1.0 - sure * (self.noise_rms / self.rms_error) ** 2, 0.0)))
+        explained = sure * self.noise_rms**2 + self.counts_rms**2
+        return float(np.sqrt(max(1.0 - explained / self.rms_error**2, 0.0)))
 
     @property
     def share_beyond_noise(self) -> float:
@@ -62,9 +64,14 @@ class SignalComparison:
 
 
 def compare_signals(
-    name: str, unit: str, time_s: Floats, measured: Floats, modelled: Floats
+    name: str,
+    unit: str,
+    time_s: Floats,
+    measured: Floats,
+    modelled: Floats,
+    uncounted: Floats | None = None,
 ) -> SignalComparison:
-    """Compare two signals sampled at the same times.
+    """Compare two signals sampled at the same times; ``uncounted``: the modelled one without counts.
 
     Raises `InputError`: for signals of different shape, fewer than two samples, values that are not finite,
     or a measured signal that is zero throughout.
@@ -98,10 +105,27 @@ def compare_signals(
         max_error_time_s=float(time_s[worst]),
         delay_s=delay_between(time_s, measured, modelled),
         noise_rms=white_noise(measured, difference),
+        counts_rms=0.0 if uncounted is None else counted_part(difference, modelled - uncounted),
         time_s=time_s,
         measured=measured,
         modelled=modelled,
     )
+
+
+def counted_part(difference: Floats, ripple: Floats) -> float:
+    """The rms of what an encoder's counts make of a difference: the ripple of a loop that they excite.
+
+    A record has as much of it as the model, at a phase that nobody knows. Without the model's the difference
+    d is d - r, of which r^2 is the record's own: of d^2 all but (d - r)^2 - r^2 is 2 r d; of two ripples
+    turned against each other 4 r^2, of which no more can be.
+
+    >>> t = np.linspace(0.0, 1.0, 1000, endpoint=False)
+    >>> model, record = (np.sin(2.0 * np.pi * (50.0 * t + turn)) for turn in (0.0, 0.25))
+    >>> round(counted_part(model - record, model), 6), round(float(np.std(model - record)), 6)
+    (1.0, 1.0)
+    """
+    both, own = float(np.mean(ripple * difference)), float(np.mean(ripple**2))
+    return float(np.sqrt(min(max(2.0 * both, 0.0), 4.0 * own)))
 
 
 def white_noise(measured: Floats, difference: Floats) -> float:

@@ -219,7 +219,7 @@ def resimulate(design: Design, record: Record, form: FrictionForm) -> Resimulate
                 signal = compare_signals(name, signal.unit, *columns)
             error, first = signal.relative_error, f"its first {len(part)} rows " * (len(part) < len(record))
             how, beyond = f"{name}, {first}simulated", signal.left_by_noise * error
-            how += f", {100.0 * error:.3g} % with its white noise" if error - beyond > 1e-3 else ""
+            how += f", {100.0 * error:.3g} % with its own noise" if error - beyond > 1e-3 else ""
             return Resimulated(record.name, name, error, beyond, how)
         except InputError as refusal:  # a part that the simulator does not have
             why = f" ({refusal.message})"

@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+from scipy.optimize import brentq
 from scipy.special import stdtrit
 
 from actuator_lti.design import parameter_value
@@ -15,7 +16,7 @@ from actuator_lti.types import Floats, Progress
 from analyses.estimation.fit import COVERAGE, Fit, Fixed
 from analyses.estimation.least_squares import RESOLVED, told_apart
 from analyses.identification.response_model import Seen
-from analyses.identification.response_search import ROUNDS, Point, Search
+from analyses.identification.response_search import Point, Search
 from analyses.records.consistency import SURE
 
 NOT_TOLD = "not determined, the design's value kept"
@@ -59,25 +60,25 @@ class _Side:
 
     def end(self, guess: float) -> float:
         """How far the end of the interval is."""
-        path = [(0.0, self.best.x), (1.0, self.best.x + self.straight)]
-        low, high, at = (0.0, 0.0), (np.inf, np.inf), min(guess, self.most)
-        for _ in range(ROUNDS if at > 0.0 else 0):
-            begin = self.search.at(_along(path, at))
-            while begin.cost > self.best.cost + (FAR * self.level) ** 2 and at - low[0] > CLOSE * at:
-                at = 0.5 * (low[0] + at)
-                begin = self.search.at(_along(path, at))
-            x, share = self.fitted(begin, at)
-            if share < 1.0 and at == self.most:
+        path = {0.0: (self.best.x, 0.0)}
+
+        def beyond(at: float) -> float:
+            while at not in path:  # the others begin as they are at the point that is nearest
+                near = min(path, key=lambda one: abs(one - at))
+                begin = self.search.at(path[near][0] + (at - near) * self.straight)
+                if begin.cost < self.best.cost + (FAR * self.level) ** 2 or abs(at - near) < CLOSE * at:
+                    path[at] = self.fitted(begin, at)
+                else:
+                    beyond(0.5 * (near + at))
+            off = path[at][1] - 1.0
+            return 0.0 if abs(off) < CLOSE else off
+
+        low, high = 0.0, min(guess, self.most)
+        while high > 0.0 > beyond(high):
+            if high == self.most:
                 return self.bound
-            if abs(share - 1.0) < CLOSE or high[0] - low[0] < CLOSE * at:
-                break
-            if share < 1.0:  # beyond, the others may be those of another valley
-                path = sorted([(at, x), *path], key=lambda one: abs(one[0] - at))[:3]
-            low, high = ((at, share), high) if share < 1.0 else (low, (at, share))
-            part = (1.0 - low[1]) / (high[1] - low[1])
-            inside = low[0] + float(np.clip(part, 0.1, 0.9)) * (high[0] - low[0])
-            at = inside if np.isfinite(high[0]) else min(at * min(1.01 / max(share, 0.25), 4.0), self.most)
-        return at
+            low, high = high, min(2.0 * high, self.most)
+        return float(brentq(beyond, low, high, rtol=CLOSE)) if high > 0.0 else 0.0
 
 
 def _interval(search: Search, best: Point, k: int, level: float, ranged: bool) -> Floats:
@@ -97,12 +98,6 @@ def _interval(search: Search, best: Point, k: int, level: float, ranged: bool) -
     untold = [guess >= one.most and np.isinf(one.bound) and one.untold() for one in sides]
     ends = np.where(untold, np.inf, 0.0) if any(untold) else np.array([one.end(guess) for one in sides])
     return np.array([-1.0, 1.0]) * ends
-
-
-def _along(path: Sequence[tuple[float, Floats]], at: float) -> Floats:
-    """The polynomial through the points of a path."""
-    weights = [np.prod([(at - t) / (own - t) for t, _ in path if t != own]) for own, _ in path]
-    return np.asarray(weights) @ np.array([x for _, x in path])
 
 
 @dataclass(frozen=True, kw_only=True)

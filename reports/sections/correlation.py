@@ -74,7 +74,10 @@ def _beyond_noise(signal: SignalComparison) -> str:
     """What is held against the limit, and what was taken off."""
     if 100.0 * (signal.share_of_motion - signal.share_beyond_noise) < 0.1:
         return _share(signal)
-    noise = f"white noise of the record, {show(signal.noise_rms, 'sig:3')} {signal.unit} rms"
+    both = {"white noise of the record": signal.noise_rms, "ripple of an encoder's counts": signal.counts_rms}
+    noise = " and the ".join(
+        f"{of}, {show(rms, 'sig:3')} {signal.unit} rms" for of, rms in both.items() if rms
+    )
     return f"{show(100.0 * signal.share_beyond_noise, 'sig:3')} % beyond the {noise}"
 
 

@@ -109,6 +109,19 @@ def test_steps_a_row_or_two_apart_are_those_of_the_drive(gaps: tuple[int, ...], 
     assert max(signal.relative_error for signal in found.signals.values()) < 1e-9
 
 
+@pytest.mark.parametrize(("factor", "least", "most"), [(1.001, 0.0, 0.05), (2.0, 0.25, 0.5)])
+def test_the_ripple_of_counts_at_another_phase_is_no_error(factor, least, most, tmp_path) -> None:
+    """A thousandth more friction puts the ripple at another phase: a third of the current; twice is seen."""
+    counted = changed(BASE, encoder={"speed": "difference", "counts_per_rev": 1024})
+    run, wanted = simulate(counted, _swing(0.02, 1.0), 1.0), ("angle [rad]", "current [A]")
+    columns = {name: ROTARY[name] for name in wanted}
+    record = open_record(_record(tmp_path / "r.csv", run, columns, **{"reference [rad]": run.reference_rad}))
+    dry = factor * counted.friction.dry_torque_Nm
+    found = correlate_record(with_values(counted, {"friction.dry_torque": dry}), record)["current"]
+    assert found.share_of_motion > 0.3
+    assert least <= found.share_beyond_noise < most
+
+
 @pytest.mark.parametrize(("column", "key", "stage"), [
     ("speed_reference [rad/s]", "speed_command_rad_s", "velocity"),
     ("current_reference [A]", "current_command_A", "current"),
