@@ -83,7 +83,7 @@ def limit_cycles(design: AnyDesign) -> LimitCycles:
     """
     design = as_design(design)
     if design.controller.position is None:
-        raise InputError("cycles: needs a drive with a position loop")
+        raise InputError("limit cycles: need a drive with a position loop")
     has_play = design.coupling is not None and design.coupling.play_rad > 0.0
     predicted = [one for rubs in (False, True) for one in describing.cycles_of_play(design, friction=rubs)]
     predicted += describing.cycles_of_quantisation(design)

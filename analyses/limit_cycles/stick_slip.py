@@ -28,6 +28,7 @@ SMALLEST, LARGEST, POINTS = 1e-3, 1.0, 241  # of the error that breaks away befo
 SLOPE_STEP = 1e-3
 HELD = 1e30  # so many times its inertia hold the rotor
 AT_ONE = 1e-6  # an eigenvalue so near to 1 integrates
+LOST = 1e-12  # of what it moves otherwise: rounding
 
 
 @dataclass(frozen=True)
@@ -36,7 +37,6 @@ class StickSlipCycle:
 
     output_amplitude_rad: float  # error at rest on either side, output side
     frequency_hz: float
-    rest_s: float  # of half a period
     slope: float  # of the next error over this; below 1 in magnitude the cycle attracts
 
     @property
@@ -55,25 +55,26 @@ class _Slip:
     counts: Floats  # what l z is when the next period begins, of the states at each tick of one that rests
     pace: float  # growth of l z over a period at a motor angle of 1
 
-    def from_error(self, error: float) -> tuple[float, float, float] | None:
-        """Error after the slip in its direction, duration, rest until the next; None: it does not end."""
-        x = self.runs[0] + error * self.runs[1]
-        w = x[:, self.states.index("w")]
+    def from_error(self, error: float) -> tuple[float, float] | None:
+        """Error after the slip in its direction, time until the next slip; None: it does not end."""
+        w = np.array([1.0, error]) @ self.runs[:, :, self.states.index("w")]
         ends = np.flatnonzero((w[1:-1] > 0.0) & (w[2:] <= 0.0)) + 1
         if not ends.size:
             return None
         k = int(ends[0])
         part = w[k] / (w[k] - w[k + 1])
-        landed = (1.0 - part) * x[k] + part * x[k + 1]
-        th, slipping = float(landed[self.states.index("th")]), float(k + part) * self.period_s
-        return -th, slipping, math.inf if th <= 0.0 else max(self._rest_s(landed, th, k), 0.0)
+        x = self.runs[0, k : k + 2] + error * self.runs[1, k : k + 2]
+        landed = (1.0 - part) * x[0] + part * x[1]
+        th = float(landed[self.states.index("th")])
+        rest = math.inf if th <= 0.0 else max(self._rest(landed, th, k), 0.0)
+        return -th, float(k + part + rest) * self.period_s
 
-    def _rest_s(self, landed: Floats, th: float, tick: int) -> float:
-        """Time from landing until the state is that of breakaway the other way, -l z of the error ``th``."""
+    def _rest(self, landed: Floats, th: float, tick: int) -> float:
+        """Ticks from landing until the state is that of breakaway the other way, -l z of the error ``th``."""
         ticks = len(self.counts) - 1
         goes = -self.counts[-1] @ (self.runs[0, 0] + th * self.runs[1, 0])
         periods = (goes - self.counts[tick % ticks] @ landed) / (self.pace * th)
-        return float(ticks * (1.0 + periods) - tick % ticks) * self.period_s
+        return float(ticks * (1.0 + periods) - tick % ticks)
 
 
 def stick_slip_cycle(design: Design, load_Nm: float, loops: Loops | None = None) -> StickSlipCycle | None:
@@ -96,12 +97,11 @@ def stick_slip_cycle(design: Design, load_Nm: float, loops: Loops | None = None)
     k = int(falls[-1])
     error = float(brentq(surplus, grid[k], grid[k + 1], xtol=1e-12 * grid[k]))
     result = slip.from_error(error)
-    if result is None or not math.isfinite(result[2]):
+    if result is None or not math.isfinite(result[1]):
         return None
-    _, slipping, resting = result
     step = SLOPE_STEP * error
     slope = (surplus(error + step) - surplus(error - step)) / (2.0 * step) + 1.0
-    return StickSlipCycle(error / design.total_ratio, 0.5 / (slipping + resting), resting, slope)
+    return StickSlipCycle(error / design.total_ratio, 0.5 / result[1], slope)
 
 
 def _alone(design: Design, load_Nm: float) -> bool:
@@ -130,15 +130,14 @@ def _slip(design: Design, load_Nm: float, loops: Loops | None) -> _Slip | None:
     counts = [count]
     for j in reversed(range(held.ticks)):
         counts.append(counts[-1] @ held.matrices(j)[0])
-    ticks = settling_ticks_in_periods(loops)
-    runs = [_run(system, x, torque, ticks) for x, torque in zip(starts, (-dry, 0.0), strict=True)]
-    return _Slip(design.controller.period_s, system.states, np.array(runs), np.array(counts[::-1]), pace)
+    runs = _runs(system, np.array(starts), np.array([-dry, 0.0]), settling_ticks_in_periods(loops))
+    return _Slip(design.controller.period_s, system.states, runs, np.array(counts[::-1]), pace)
 
 
 def _stands(design: Design, held: TickSystem, torque_Nm: float) -> tuple[Floats, float] | None:
     """As the drive breaks away: the states without an error, by an error of 1, and l; growth of l z.
 
-    None: not one mode integrates, or one grows.
+    None: not one mode integrates, or one grows, or it does not drive against an error.
     """
     names, over = held.states, np.eye(len(held.states))
     for j in range(held.ticks):
@@ -154,19 +153,23 @@ def _stands(design: Design, held: TickSystem, torque_Nm: float) -> tuple[Floats,
     seen, level = ("i", current) if "i" in names else ("u", volts)
     row = held.matrices(0)[2][held.outputs.index(seen)]
     left, _, right = np.linalg.svd(A - np.eye(len(A)))
+    if abs(row[moves] @ right[-1]) < LOST * np.abs(row).max():
+        return None
     ramp = right[-1] / (row[moves] @ right[-1])
     count = left[:, -1] / (left[:, -1] @ ramp)
     whole = np.block([[np.eye(len(A)) - A, ramp[:, None]], [row[moves], 0.0]])  # of z, and its growth
     given = np.array([[*(0.0 * fed), level], [*-fed, row[th]]])
     found = np.zeros((3, len(names)))
     found[:2, moves], found[1, th], found[2, moves] = np.linalg.solve(whole, given.T).T[:, :-1], -1.0, count
-    return found, float(count @ fed)
+    pace = float(count @ fed)
+    return (found, pace) if pace < 0.0 else None
 
 
-def _run(system: TickSystem, state: Floats, torque_Nm: float, count: int) -> Floats:
-    """The states at so many ticks under a constant torque at the motor."""
-    ticks, run = [system.matrices(j) for j in range(system.ticks)], np.empty((count, len(state)))
+def _runs(system: TickSystem, x: Floats, torques_Nm: Floats, count: int) -> Floats:
+    """The states from each row of x on, at so many ticks under a constant torque each at the motor."""
+    phases, runs = [system.matrices(j) for j in range(system.ticks)], np.empty((count, *x.shape))
+    ticks = [(A.T, np.outer(torques_Nm, B[:, 1])) for A, B, _, _ in phases]
     for k in range(count):
-        A, B, _, _ = ticks[k % system.ticks]
-        run[k], state = state, A @ state + B[:, 1] * torque_Nm
-    return run
+        A, driven = ticks[k % system.ticks]
+        runs[k], x = x, x @ A + driven
+    return runs.swapaxes(0, 1)

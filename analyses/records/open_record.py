@@ -156,13 +156,24 @@ def _spec_of_file(path: Path, suffix: str) -> tuple[RecordSpec, Mapping[str, str
             raise InputError("is no text but binary or packed; allowed: " + RECORDS, where=shown_path(path))
         head = text_of(data[: data.rfind(b"\n") + 1] or data).removeprefix("\ufeff")  # of whole lines
         if head.startswith("%Motor characterization data"):
-            return ODRIVE_SPEC, {}
+            return _odrive_spec(head), {}
         columns, layout = _columns_of_csv(head)
         spec, why = spec_of_names(columns, layout)
     if spec is None:
         first = "; ".join(f"{shown(column)}: {reason}" for column, reason in list(why.items())[:20])
         raise InputError(f"{UNKNOWN} ({first})" if first else UNKNOWN, where=str(path))
     return spec, why
+
+
+def _odrive_spec(head: str) -> RecordSpec:
+    """The recorder's layout, where its last two comments name its columns in their order and their units."""
+    lines = [line.removeprefix("%").split(",") for line in head.splitlines() if line.startswith("%")]
+    names = tuple(cell.partition(" (")[0].strip().lower() for cell in lines[-2:][0])
+    units = dict(zip(names, (cell.strip(" []").replace("turns", "turn") for cell in lines[-1]), strict=False))
+    if not set(ODRIVE_SPEC.format.names) == set(names) == set(units):
+        return ODRIVE_SPEC
+    signals = tuple(replace(one, unit=units[str(one.column)]) for one in ODRIVE_SPEC.signals)
+    return replace(ODRIVE_SPEC, format=replace(ODRIVE_SPEC.format, names=names), signals=signals)
 
 
 def _columns_of_csv(head: str) -> tuple[tuple[str, ...], CsvFormat]:

@@ -404,3 +404,18 @@ def test_odrive_rows_are_counted(odrive_files: dict[str, Path]) -> None:
     assert record.counts.rows_in == 1309
     assert record.counts.dropped == {"with a missing value": 8, "time below 1 s": 11}
     assert record.counts.rows_out == len(record) == 1290
+
+
+def test_an_odrive_file_is_read_by_its_own_names_and_units(odrive_files: dict[str, Path], tmp_path) -> None:
+    """The same rows with two columns exchanged, names and units with them, and angles in deg."""
+    lines = odrive_files["step1"].read_text().replace(";", "").splitlines()
+    at = next(k for k, line in enumerate(lines) if "timestep (" in line)
+    rows = [cells for line in lines[at:] if len(cells := line.split(",")) == 4]
+    rows[1][2] = "[deg]"
+    rows[2:] = [[t, u, f"{360.0 * float(x)!r}" if x else x, w] for t, u, x, w in rows[2:]]
+    text = "".join(",".join((t, u, w, x)) + ";\n" for t, u, x, w in rows)
+    text = text.replace(";", "", 2)  # the comments have none
+    (tmp_path / "r.csv").write_text("\n".join(lines[:at]) + "\n" + text)
+    read, wanted = open_record(tmp_path / "r.csv"), open_record(odrive_files["step1"])
+    for name in wanted.signals:
+        assert read[name] == pytest.approx(wanted[name], rel=1e-12)

@@ -238,6 +238,8 @@ def test_stick_slip_needs_breakaway_above_friction_and_an_integral() -> None:
         assert point.cycles.as_predicted
     emps = with_values(EMPS, {"friction.breakaway_ratio": 2.0})
     assert friction_effects(emps).points[0].cycles.stick_slip is None
+    unseen = ([[1.0, 0.0], [0.0, 0.5]], [[1.0], [1.0]], [[0.0, 1.0]], [[1.0]], 1e-4)  # drives nothing
+    assert stick_slip_cycle(STICKY.with_law("velocity", unseen, ["error"]), 0.0) is None
 
 
 def test_a_p_current_loop_gives_a_part_of_its_command_and_overshoots_it() -> None:
