@@ -108,6 +108,6 @@ def test_the_wheel_holds_the_compiled_kernels_of_this_machine_and_a_light_core(b
         if line.startswith("Requires-Dist") and "extra ==" not in line
     }
     assert core == {
-        "control", "numpy", "scipy", "pydantic", "typer", "rich", "jinja2", "tomli-w",
+        "control", "numpy", "scipy", "pydantic", "typer", "rich", "jinja2", "tomli-w", "tomlkit",
         "defusedxml", "python-flint",
     }  # fmt: skip
