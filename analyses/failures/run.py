@@ -107,8 +107,8 @@ def failures(design: AnyDesign, asked: Asked | None = None) -> Failures:
     design = as_design(design)
     asked = Asked.of(design) if asked is None else asked
     if asked.watched_s / design.controller.period_s > MOST_TICKS:
-        longest = MOST_TICKS * design.controller.period_s
-        raise InputError(f"watched {asked.watched_s:g} s: at most {longest:g} s with this period")
+        longest = f"{MOST_TICKS * design.controller.period_s:g} s ({MOST_TICKS} ticks)"
+        raise InputError(f"watched_s = {asked.watched_s:g} s: allowed: at most {longest}")
     wait = ceil(_settling_s(design, asked) / design.controller.period_s)
     cases, left_out = cases_of(design, asked)
     before = {start: _before(design, asked.load_Nm, start) for start in sorted({c.start for c in cases})}
