@@ -156,7 +156,8 @@ def test_rows_thinned_out_tell_the_motor_within_their_intervals(ticks: Record, e
 
 
 @pytest.mark.parametrize(
-    ("gain", "every", "told", "near"), [(20.0, 10, True, 2e-3), (50.0, 20, True, 2e-3), (50.0, 10, False, 0.01)]
+    ("gain", "every", "told", "near"),
+    [(20.0, 10, True, 2e-3), (50.0, 20, True, 2e-3), (50.0, 10, False, 0.01)],
 )
 def test_rows_at_the_ticks_of_the_position_loop_tell_the_inertia(gain, every, told, near) -> None:
     """Each shows the end of what the loops made of a jump: 2 to 7 % low, the interval no narrower.
