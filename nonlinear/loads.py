@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy.typing as npt
 
 from actuator_lti.errors import finite_number
-from actuator_lti.start.border import asked, guard
+from actuator_lti.start.public_arguments import asked, guard
 from nonlinear.commands import Command, on_its_clock
 
 __all__ = ["LoadMoment", "constant", "proportional", "series"]

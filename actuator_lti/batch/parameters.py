@@ -11,7 +11,7 @@ import numpy as np
 
 from actuator_lti.design.access import located, paths_of, stacked
 from actuator_lti.errors import InputError
-from actuator_lti.start.border import asked
+from actuator_lti.start.public_arguments import asked
 from actuator_lti.systems.sampling import split_delay
 
 if TYPE_CHECKING:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from actuator_lti.errors import InputError, finite_number
-from actuator_lti.start.border import asked
+from actuator_lti.start.public_arguments import asked
 
 if TYPE_CHECKING:
     from actuator_lti.design.model import Design, FrictionPoint

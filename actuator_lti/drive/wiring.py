@@ -42,7 +42,7 @@ class Drive:
     stages: tuple[str, ...]  # those present, innermost first, of "current", "velocity", "position"
     interval: dict[str, int]  # ticks between two updates of each, and of the speed measurement ("speed")
     target: dict[str, str]  # the signal that each stage drives: "u", "i_ref" or "w_ref"
-    # Loops cut at a break point, how far they are from their border, kept by `actuator_lti.loops.periodic`
+    # Loops cut at a break point and their distances to the stability limit, by `actuator_lti.loops.periodic`
     blocks_at: dict[str, Any] = field(default_factory=dict, init=False, repr=False, compare=False)
     margins_at: dict[Any, Any] = field(default_factory=dict, init=False, repr=False, compare=False)
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from actuator_lti.drawing import draw
 from actuator_lti.errors import InputError
-from actuator_lti.start.border import checks_arguments
+from actuator_lti.start.public_arguments import checks_arguments
 from actuator_lti.systems.as_control import as_control
 
 Form = Literal["sampled", "continuous", "ideal"]

@@ -88,10 +88,10 @@ class LargeSignal:
         figures: dict[str, float | None] = {}
         for frequency in self.frequencies_hz:
             try:
-                border = with_cogging(loops, onset(loops, [2 * pi * frequency]))
+                linear_limit = with_cogging(loops, onset(loops, [2 * pi * frequency]))
             except InputError:
                 continue  # beyond Nyquist of the position loop
-            figures[f"large.onset@{frequency:g}"] = float(border.amplitude_rad[0]) * shown
+            figures[f"large.onset@{frequency:g}"] = float(linear_limit.amplitude_rad[0]) * shown
         for load in self.loads_Nm:
             step = StepCheck(self.deflection_rad, self.duration_s, load)
             columns = step_columns(step, Population(design, {}, 1))

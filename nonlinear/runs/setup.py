@@ -12,7 +12,7 @@ from actuator_lti.bounds import RUN_TICKS
 from actuator_lti.design.loader import AnyDesign, as_design
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError, finite_number, positive_number, shown
-from actuator_lti.start.border import asked
+from actuator_lti.start.public_arguments import asked
 from actuator_lti.types import Compared, Floats
 from nonlinear._kernels import layout as at
 from nonlinear.bench.probe import Probe, write_probe

@@ -24,7 +24,7 @@ MEANING = {
     "certified": "exact arithmetic on the numbers of the loop as stored, each crossing and pole in a proven "
     "interval, and the same answer for numbers 8 units in the last place away",
     "checked": "double precision; poles and Nyquist count agree, no pole lies within its own error of the "
-    "border",
+    "stability limit",
     "withheld": "the numbers of the loop do not determine the answer",
 }
 

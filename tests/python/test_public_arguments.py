@@ -95,7 +95,8 @@ PUBLIC = {
     "analyses.monte_carlo": "MonteCarloSettings SampleTask StepCheck monte_carlo replay",
     "analyses.motion": "Asked motion",
     "analyses.specification": "specification",
-    "analyses.stiffness": "check_stiffness lost_motion_seen stiffness stiffness_at_rest stiffness_curves",
+    "analyses.stiffness": "check_stiffness lost_motion_simulated stiffness stiffness_at_rest "
+    "stiffness_curves",
     "analyses.tuning": "TuningSettings",
     "analyses.validation": "Asked Settings",
     "reports": "report",
@@ -117,7 +118,8 @@ SMALLER = {  # a design for which they answer, or sooner than for ilr33-amber
     for design, names in (
         (SMALL, "assemble_loops plant write_design evaluate_requirements survey_loops tune validate corners "
         "limit_cycles margins report"),
-        (FIN, "duty failures check_stiffness lost_motion_seen stiffness stiffness_at_rest stiffness_curves"),
+        (FIN, "duty failures check_stiffness lost_motion_simulated stiffness stiffness_at_rest "
+        "stiffness_curves"),
     )
     for name in names.split()
 }  # fmt: skip

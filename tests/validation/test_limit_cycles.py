@@ -98,7 +98,7 @@ def test_below_the_linear_amplitude_the_simulator_is_off_and_beyond_it_is_not() 
     found = of_difference(1024)
     assert found.off[0] > 0.3
     assert (found.off[2:] < 0.05).all()
-    assert found.linear_seen_rad == pytest.approx(found.linear_rad)
+    assert found.linear_simulated_rad == pytest.approx(found.linear_rad)
 
 
 def test_a_small_cycle_keeps_its_digits_in_a_document() -> None:
@@ -115,7 +115,7 @@ def test_a_drive_that_only_friction_holds_has_no_linear_amplitude() -> None:
     """Seed 40018: without friction its response grows without bound; NaN was compared with NaN."""
     design = full_drive(40018)
     found = counts_of(design, assemble_loops(design))
-    assert all(np.isinf(one.off).all() and one.linear_seen_rad is None for one in found)
+    assert all(np.isinf(one.off).all() and one.linear_simulated_rad is None for one in found)
 
 
 @pytest.mark.parametrize("x", [0.01, 0.3, 0.7, 0.99])
