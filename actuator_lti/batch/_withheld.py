@@ -26,7 +26,7 @@ MOST_ERROR = 1e-10  # relative, of the response at a crossover: the margins are 
 BETWEEN = np.array([0.03, 0.3, 1.0, 2.5])
 
 
-def _is_told(n, a, b, c, x, work, state, sizes):
+def _is_resolved(n, a, b, c, x, work, state, sizes):
     """Whether L at an angle stands out from its rounding errors, see `actuator_lti.margins.trust`."""
     states_at(n, a, c, b, True, x, work, state)
     for i in range(n):
@@ -42,19 +42,19 @@ def _is_told(n, a, b, c, x, work, state, sizes):
     return math.hypot(real, imaginary) * MOST_ERROR >= EPS * bound
 
 
-def _crossings_are_told(n, a, b, c, poles, row, work, state, sizes):
+def _crossings_are_resolved(n, a, b, c, poles, row, work, state, sizes):
     """The same at every crossover and between; at rest without the modes that do not show, as its figures."""
     at_rest = False
     for k in range(BETWEEN.shape[0]):
-        if not _is_told(n, a, b, c, BETWEEN[k], work, state, sizes):
+        if not _is_resolved(n, a, b, c, BETWEEN[k], work, state, sizes):
             return False
     for k in range(min(int(row[GAIN_CROSSOVERS]), LISTED)):
-        if not _is_told(n, a, b, c, row[FIRST_GAIN + 2 * k], work, state, sizes):
+        if not _is_resolved(n, a, b, c, row[FIRST_GAIN + 2 * k], work, state, sizes):
             return False
     for k in range(min(int(row[PHASE_CROSSOVERS]), LISTED)):
         x = row[FIRST_PHASE + 2 * k]
         at_rest = at_rest or (x == 0.0 and math.isfinite(row[DC_GAIN]))
-        if x != 0.0 and not _is_told(n, a, b, c, x, work, state, sizes):
+        if x != 0.0 and not _is_resolved(n, a, b, c, x, work, state, sizes):
             return False
     if not at_rest:
         return True
@@ -62,7 +62,7 @@ def _crossings_are_told(n, a, b, c, poles, row, work, state, sizes):
     for i in range(n):
         for j in range(n):
             a[i * n + j] = (1.0 if i == j else 0.0) - work[i * n + j]
-    return _is_told(n, a, b, c, 0.0, work, state, sizes)
+    return _is_resolved(n, a, b, c, 0.0, work, state, sizes)
 
 
 def _crossover_missed(n, a, b, c, row, work, state):
@@ -85,4 +85,4 @@ def rounding_decides(n, a, b, c, poles, row, work, state, sizes):
     fastest = 0.0
     for i in range(n):
         fastest = max(fastest, math.hypot(poles[i], poles[n + i]))
-    return fastest > GROWTH and not _crossings_are_told(n, a, b, c, poles, row, work, state, sizes)
+    return fastest > GROWTH and not _crossings_are_resolved(n, a, b, c, poles, row, work, state, sizes)

@@ -119,7 +119,7 @@ def linear_figures(
     ``time_figures``: whether to follow the step responses as well (most of the time), or of which loops.
     ``held``: give an inner loop that its load, or what holds its torque over a tick, drives away by itself,
     in a drive that is stable as a whole, the figures of the same loop with the rotor held (current) or the
-    load moment held (velocity), if stable.
+    load torque held (velocity), if stable.
     ``threads``: that share the designs.
     ``loops``: those whose figures are wanted, by default all that the structure has.
 
@@ -135,7 +135,9 @@ def linear_figures(
 
     def fill(of: Collection[str], some: Population, numbers: np.ndarray) -> None:
         chunks = (
-            group[first : first + _CHUNK] for group in some.alike() for first in range(0, len(group), _CHUNK)
+            group[first : first + _CHUNK]
+            for group in some.same_structure()
+            for first in range(0, len(group), _CHUNK)
         )
 
         def one(chosen: np.ndarray) -> None:
@@ -167,7 +169,7 @@ def _hold(population: Population, at: Operating, loop: str, out: np.ndarray, tim
 
     def rows(chosen: np.ndarray, operating: Operating) -> np.ndarray:
         some, result = population.part(chosen), np.full((len(chosen), *out.shape[1:]), np.nan)
-        for group in some.alike():
+        for group in some.same_structure():
             _fill(wire(some.part(group).stacked, operating), group, timed, result, (loop,))
         return result[:, place]
 

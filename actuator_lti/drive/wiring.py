@@ -52,7 +52,7 @@ class Drive:
 
     @cached_property
     def hold(self) -> DelayedHold:
-        """The sampled plant; the angle is an exact integrator. Second inputs: torque at the motor, moment."""
+        """The sampled plant; the angle is an exact integrator. Second inputs: motor and load torque."""
         plant, control = self.plant, self.design.controller
         B = np.stack(np.broadcast_arrays(plant.B_T, plant.B_M), axis=-1)
         hold = delayed_hold(plant.A, plant.B_u[..., None], B, control.period_s, control.computing_delay_s)

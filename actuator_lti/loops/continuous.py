@@ -123,10 +123,10 @@ def reference_to_output(wired: Drive, delays: frozenset[str]) -> Any:
     return finished(total, "reference_to_output", source, label)
 
 
-def moment_to_output(wired: Drive, delays: frozenset[str]) -> Any:
+def load_torque_to_output(wired: Drive, delays: frozenset[str]) -> Any:
     """Moment on the output shaft to the output angle, all loops closed."""
-    system = delay_system(_whole(wired, delays), "moment", "output_angle")
-    return finished(system, "moment_to_output", "moment", "output_angle")
+    system = delay_system(_whole(wired, delays), "load_torque", "output_angle")
+    return finished(system, "load_torque_to_output", "load_torque", "output_angle")
 
 
 def limiters(wired: Drive, delays: frozenset[str]) -> dict[str, LimiterPath]:

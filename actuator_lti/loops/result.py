@@ -139,8 +139,8 @@ class Loops:
     from the angle stays closed.
     ``limiters``: a `LimiterPath` from the command to what each limiter sees, by the names of
     `actuator_lti.drive.signals.LIMITERS`, as far as they exist.
-    ``plain_response``, ``moment_system``: what `reference_to_output` is made of when it is first asked for
-    (as of a `Loop`), and what makes `moment_to_output`.
+    ``plain_response``, ``load_torque_system``: what `reference_to_output` is made of when it is first asked
+    for (as of a `Loop`), and what makes `load_torque_to_output`.
     ``tick_system``: the whole sampled closed loop, tick by tick (form "sampled").
     ``period_s``: base period Ts; None where not sampled.
     """
@@ -155,7 +155,7 @@ class Loops:
     break_points: Mapping[str, Loop]
     limiters: Mapping[str, LimiterPath]
     plain_response: Any | None
-    moment_system: Callable[[], Any] | None
+    load_torque_system: Callable[[], Any] | None
     tick_system: TickSystem | None
     period_s: float | None
 
@@ -170,14 +170,14 @@ class Loops:
         return as_control(self.plain_response)
 
     @cached_property
-    def moment_to_output(self) -> Any | None:
+    def load_torque_to_output(self) -> Any | None:
         """Moment on the output shaft, held over every tick, to the output angle, all loops closed.
 
         The compliance, as a python-control system; its inverse is the dynamic stiffness. It is made when it
         is first asked for: with slow outer stages it has hundreds of states
         (`actuator_lti.loops.stiffness` has the same response with few). None with the rotor locked.
         """
-        return None if self.moment_system is None else as_control(self.moment_system())
+        return None if self.load_torque_system is None else as_control(self.load_torque_system())
 
     @property
     def operating_point(self) -> str:

@@ -66,15 +66,15 @@ def whole_path(wired: Drive) -> tuple[str, str, int, str]:
     return COMMANDS[stage], signal, wired.interval.get(stage, 1), label
 
 
-def moment_to_output(wired: Drive) -> PlainSystem:
+def load_torque_to_output(wired: Drive) -> PlainSystem:
     """Moment on the output shaft, held over every tick, to the output angle: the compliance, all loops
     closed.
 
     Its inverse is the dynamic stiffness (model.md section 9). Where the drive has slower stages, the
     fundamental of the periodic loop.
     """
-    block = fundamental_path(TickProgram(wired, wired.outermost), 1, "moment", "output_angle")
-    return _system(block, "moment_to_output", "moment", "output_angle", wired.tick_s)
+    block = fundamental_path(TickProgram(wired, wired.outermost), 1, "load_torque", "output_angle")
+    return _system(block, "load_torque_to_output", "load_torque", "output_angle", wired.tick_s)
 
 
 def tick_system(wired: Drive) -> TickSystem:

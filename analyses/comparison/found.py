@@ -56,7 +56,7 @@ def small_signal(design: Design, result: Mapping[str, LoopFigures]) -> dict[str,
         for name, quantity in LOOP_QUANTITIES.items():
             value = quantity.read(one) if one.stable else None
             figures[f"{loop}.{name}"] = None if value is None else float(value)
-    stands = all(one.sound is not False for one in result.values())
+    stands = all(one.is_stable is not False for one in result.values())
     for name, load in drive_cases(design.validation.loads_Nm):
         value = float(drive_figure(design, name, load))
         there = stands or QUANTITIES[name].source != "stiffness"

@@ -136,7 +136,7 @@ class SplitDrive:
 
 HELD = 1e6  # times the stall torque: no torque of the drive moves a jam
 
-Course = Callable[[float], float]
+CommandOverTime = Callable[[float], float]
 
 
 @dataclass(frozen=True)
@@ -145,7 +145,7 @@ class Case:
 
     name: str
     words: str  # with {speed} and {energy} as in `SplitDrive.turning`
-    command: Course  # command over the time from the failure on (from the step on, where ``at_rad`` is given)
+    command: CommandOverTime  # from the failure on (from the step on, where ``at_rad`` is given)
     broken: Callable[[SplitDrive], None] = lambda _: None  # what is done to the split drive
     start: float = 0.0  # command that the drive follows before
     at_rad: float | None = None  # when the output is this far from the start; ``None``: at once

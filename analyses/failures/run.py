@@ -26,7 +26,7 @@ class FailureCase:
 
     name: str  # such as ``"hard-over"``
     words: str  # what happens
-    # Output side; the moment is that in the coupling; rigid, what the output takes: its inertia and load, or
+    # Output side; the torque is that in the coupling; rigid, what the output takes: its inertia and load, or
     # on a jam the motor's torque less the train's friction
     time_s: Floats
     deflection_rad: Floats
@@ -65,7 +65,7 @@ class Failures:
 
     @property
     def failure_moment_Nm(self) -> float:
-        """Largest moment in the train over all failures."""
+        """Largest torque in the train over all failures."""
         return max(case.peak_moment_Nm for case in self.cases)
 
     @cached_property

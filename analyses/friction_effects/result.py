@@ -67,13 +67,13 @@ def limit_cycles(
     sliding ``loops``, ``settlings`` of the drive as it is, of which those at rest are not asked again.
     """
     given, design = design, quiet(design)
-    alike = np.array_equal(Rows.of(given).values, Rows.of(design).values)
+    equal = np.array_equal(Rows.of(given).values, Rows.of(design).values)
     if predicted is None:
         predicted = described_cycles(design, load_Nm)
     checked = tuple(confirm(design, cycle) for cycle in predicted)
     slips = stick_slip_cycle(design, load_Nm, loops)
     known = tuple(one for one in settlings or () if one.load_Nm == load_Nm)
-    steps = known if known and alike else settlings_of(design, loops, (load_Nm,), known)
+    steps = known if known and equal else settlings_of(design, loops, (load_Nm,), known)
     return LimitCycles(design, checked, slips, steps)
 
 

@@ -182,7 +182,7 @@ class _InitialConditionResponse:
         self.kind, self.part, self.sizes = kind, part, full_range(design)
         setup, still = bench.setup(name), OperatingMotion(0.0, 0.0, 0.0, friction_on)
         if setup.outer != design.controller.outermost:
-            # The load's own moment as a constant, held: where it changes, it swings open outer loops
+            # The load's own torque as a constant, held: where it changes, it swings open outer loops
             held, coupling = setup.design, setup.design.coupling
             carried = holding_moment_Nm(held)
             twist = (

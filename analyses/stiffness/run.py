@@ -50,10 +50,10 @@ class StiffnessCurve:
 
 @dataclass(frozen=True)
 class LostMotion:
-    """How far the output is apart under a small moment to either side, the motor held; at least the play."""
+    """How far apart a small load torque moves the output, the motor held; at least the play."""
 
     play_rad: float  # the play of the coupling at the output
-    predicted_rad: float  # at +-3 % of the largest load moment (`actuator_lti.loops.stiffness`)
+    predicted_rad: float  # at +-3 % of the largest load torque (`actuator_lti.loops.stiffness`)
     simulated_rad: float | None = None  # the same in the simulator; None where it was not asked
 
 
@@ -76,7 +76,7 @@ class Check:
 
 @dataclass(frozen=True)
 class AtRest:
-    """Fundamental stiffness of the drive as it is, at rest, to a sinusoidal moment.
+    """Fundamental stiffness of the drive as it is, at rest, to a sinusoidal load torque.
 
     inf: no motion; NaN: none that comes again in the next period, as of a drive that hunts.
     """
@@ -143,7 +143,7 @@ def check_stiffness(design: Design, frequencies_hz: Sequence[float]) -> tuple[Ch
     """The simulator's own derivative from the load to the output (`nonlinear.tangent`) beside the loops.
 
     Without play and counts; at rest without dry friction or, where friction has other slopes in motion,
-    creeping with it.  An output that no moment moves is pushed with the largest load moment.
+    creeping with it.  An output that no load torque moves is pushed with the largest load torque.
 
     Raises `UnstableError`: for a loop that is not stable.
     """
@@ -175,7 +175,7 @@ def _ways(design: Design) -> list[OperatingPoint]:
 
 
 def stiffness_at_rest(design: Design, asked: Sequence[tuple[float, float]]) -> tuple[AtRest, ...]:
-    """Fundamental stiffness of the drive as it is, command held, at (frequency in Hz, moment in N m)."""
+    """Fundamental stiffness of the drive as it is, command held, at (frequency in Hz, torque in N m)."""
     made, period, every = [], design.controller.period_s, design.controller.position_loop.every
     settling = settling_ticks_of(design, LEFT)
     for frequency, amplitude in asked:
@@ -194,12 +194,12 @@ def stiffness_at_rest(design: Design, asked: Sequence[tuple[float, float]]) -> t
 
 
 def lost_motion_simulated(design: Design) -> float:
-    """Lost motion in the simulator, the rotor held: a slow moment goes to +`LOST_MOTION_SHARE`, then to -.
+    """Lost motion in the simulator, the rotor held: a slow load goes to +`LOST_MOTION_SHARE`, then to -.
 
     The load is damped critically against the spring in place of its own friction, so that it lands behind the
-    play without a bounce; at both readings the moment stays until it has gone through the play.
+    play without a bounce; at both readings it stays until it has gone through the play.
 
-    Raises `InputError`: without a coupling, a position loop or a largest load moment.
+    Raises `InputError`: without a coupling, a position loop or a largest load torque.
     """
     coupling, rated = design.coupling, design.load.moment_max_Nm
     if coupling is None or design.controller.position is None or rated <= 0.0:
@@ -228,14 +228,14 @@ def lost_motion_simulated(design: Design) -> float:
 STATES: tuple[State, ...] = ("powered", "shorted", "open")
 CHECKED_HZ = (2.0, 10.0, 50.0)
 REST_HZ = (2.0, 20.0)
-REST_FRACTIONS = (0.01, 0.1, 1.0)  # of the largest moment
+REST_FRACTIONS = (0.01, 0.1, 1.0)  # of the largest load torque
 
 
 def stiffness(design: AnyDesign, *, simulated: bool = True) -> Stiffness:
     """Dynamic and static stiffness and lost motion of a design.
 
-    ``simulated``: put them to the simulator, by a moment injected at three frequencies, and a slow one to
-    either side.
+    ``simulated``: put them to the simulator, by a load torque injected at three frequencies, and a slow one
+    to either side.
 
     Raises `InputError`: for a loop that is not stable.
     """

@@ -452,7 +452,7 @@ SIGNALS = (
 BASE_SIGNALS = 7
 ALL_SIGNALS = 15
 # columns of the history: the base signals, then the motor angle, then before and after of each active probe,
-# then output speed, twist and coupling torque of an elastic drive, then the load moment where it varies
+# then output speed, twist and coupling torque of an elastic drive, then the load torque where it varies
 HISTORY_ANGLE = 7
 HISTORY_PROBES = 8
 ELASTIC_COLUMNS = 3

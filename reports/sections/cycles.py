@@ -24,9 +24,11 @@ def section(result: LimitCycles) -> doc.Section:
     causes = " or ".join(CAUSES[name] for name in result.looked_for) or "play or a quantised output sensor"
     none = doc.text(f"No limit cycle of {causes} is predicted.")
     predicted = _predicted(result, fine) if result.confirmations else none
-    told = doc.severity(result.verdict)
+    severity = doc.severity(result.verdict)
     blocks, words = [predicted, _rests(result, fine)], summary(result)
-    return doc.section("cycles", "Limit cycles", blocks, result=words, intro=intro, status=told, told=told)
+    return doc.section(
+        "cycles", "Limit cycles", blocks, result=words, intro=intro, status=severity, severity=severity
+    )
 
 
 def summary(result: LimitCycles) -> str:

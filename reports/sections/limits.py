@@ -40,7 +40,7 @@ def section(design: Design, linear_limit: Onset) -> doc.Section:
     intro = "A linear prediction ends where a limit is reached. Which one, and when, depends on frequency."
     words = _result(rows, linear_limit, scale, unit)
     title = "Validity of the linear model"
-    return doc.section("limits", title, blocks, result=words, intro=intro, told="info")
+    return doc.section("limits", title, blocks, result=words, intro=intro, severity="info")
 
 
 def _chart(design: Design, linear_limit: Onset, scale: float, unit: str) -> style.Chart:

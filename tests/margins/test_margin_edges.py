@@ -7,7 +7,7 @@ import mpmath
 import numpy as np
 import pytest
 from margin_families import clusters_and_near_cancellations, deadbeat_and_zeros_at_minus_one, orders_1_to_25
-from margin_truth import difference, towards_the_border, truth_of
+from margin_truth import difference, towards_the_limit, truth_of
 
 from actuator_lti import load_design
 from actuator_lti.bandwidth import closed_loop_bandwidth, peaks
@@ -162,7 +162,7 @@ def test_a_loop_that_is_unstable_in_any_case_is_said_to_be(k: float) -> None:
         m = stability_margins(loop, certify=certify)
         assert (m.verdict, m.evidence) == ("unstable", "certified")
         assert difference(m, truth_of(loop)) is None
-        told = {truth_of(near).unstable for near in (loop, towards_the_border(loop))}
+        told = {truth_of(near).unstable for near in (loop, towards_the_limit(loop))}
         assert len(told) == 2  # how many there are the data do not determine
 
 

@@ -36,7 +36,7 @@ def test_k4_by_the_loops_and_by_the_simulator() -> None:
     loops = assemble_loops(drive_e())
     for (frequency, size, angle), check in zip(K4, checks, strict=True):
         K = stiffness_at(compliance(drive_e()), frequency)[0]
-        of_loops = 1 / loops.moment_to_output(np.exp(2j * np.pi * frequency * 2e-4))
+        of_loops = 1 / loops.load_torque_to_output(np.exp(2j * np.pi * frequency * 2e-4))
         for found, within in ((K, 1e-10), (of_loops, 1e-10), (check.simulated_Nm_rad, 1e-9)):
             assert abs(found) == pytest.approx(size, rel=within)
             assert np.angle(found, deg=True) == pytest.approx(angle, abs=1e-7)

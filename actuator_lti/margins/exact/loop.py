@@ -73,14 +73,14 @@ class ExactLoop:
         return self.N[self.degree], self.D[self.degree]
 
 
-def neighbours(given: Given, loop: ExactLoop, told: int = 1) -> list[ExactLoop]:
+def neighbours(given: Given, loop: ExactLoop, placed: int = 1) -> list[ExactLoop]:
     """The same from data 8 ulp away.
 
-    Where more modes at the stability limit cancel exactly than their place shows (``told``), what is seen is
-    moved and they stay: data next to these would have a pole beside a zero there, and nothing in common
+    Where more modes at the stability limit cancel exactly than their place shows (``placed``), what is seen
+    is moved and they stay: data next to these would have a pole beside a zero there, and nothing in common
     with the loop.
     """
-    if loop.hidden_modes.at_limit <= told and not loop.hidden_at_end:
+    if loop.hidden_modes.at_limit <= placed and not loop.hidden_at_end:
         return [exact_loop(near) for near in given.neighbours()]
     return [replace(loop, N=_moved(loop.N, way), D=_moved(loop.D, way)) for way in (1, -1)]
 

@@ -64,7 +64,7 @@ def late_margins(given: Given, delay_s: float, band: tuple[float, float] | None)
         if loop.N.degree() < 0:  # nothing is fed back, early or late
             return replace(certified_margins(given, band), delay_s=delay_s)
         delays = (delay_s + way * ULP * float(np.spacing(delay_s)) for way in (0.0, 1.0, -1.0))
-        near = (loop, *neighbours(given, loop, told=0))
+        near = (loop, *neighbours(given, loop, placed=0))
         one = len({_above_one(each) for each in near}) > 1 or _above_one(loop) == 0
         pairs = zip(near, delays, strict=True)
         base, *others = [_found(each, given.period_s, delay, band, one) for each, delay in pairs]

@@ -125,10 +125,10 @@ def half_planes(p: fmpz_poly) -> HalfPlanes:
         right = symmetric.degree() - sum(times for _, times in undamped)
     beyond = right_of_axis(p)
     if beyond is None:
-        beyond = sum(times for root, times in _told_from_axis(p) if root.real > 0)
+        beyond = sum(times for root, times in _clear_of_axis(p) if root.real > 0)
 
     def found() -> tuple[acb, ...]:
-        return tuple(root for root, times in (*placed, *_told_from_axis(p)) for _ in range(times))
+        return tuple(root for root, times in (*placed, *_clear_of_axis(p)) for _ in range(times))
 
     return HalfPlanes(right + beyond, at_zero, tuple(undamped), found)
 
@@ -174,14 +174,14 @@ def warped(p: Polynomial, degree: int) -> Polynomial:
     return kind(about[::-1])(kind([1, -1]))
 
 
-def _told_from_axis(p: fmpz_poly) -> list[tuple[acb, int]]:
+def _clear_of_axis(p: fmpz_poly) -> list[tuple[acb, int]]:
     """All roots of a polynomial that has none on the axis, each known to lie left or right of it."""
 
-    def told() -> list[tuple[acb, int]] | None:
+    def isolated() -> list[tuple[acb, int]] | None:
         roots = all_roots(p)
         return roots if all(root.real > 0 or root.real < 0 for root, _ in roots) else None
 
-    return at_enough_bits(told, ctx.prec, "a closed-loop pole")
+    return at_enough_bits(isolated, ctx.prec, "a closed-loop pole")
 
 
 def at_enough_bits(find: Callable[[], Answer | None], bits: int, what: str) -> Answer:
