@@ -12,7 +12,9 @@ from actuator_lti.batch import _figures as fig
 from actuator_lti.batch.library import many_loops, quoted
 from actuator_lti.batch.parameters import Population
 from actuator_lti.bounds import LOOP_STATES
+from actuator_lti.design.model import Command
 from actuator_lti.drive.operating import Operating, OperatingPoint, pushes_away
+from actuator_lti.drive.profile import command_mean
 from actuator_lti.drive.wiring import Drive, present, wire
 from actuator_lti.errors import InputError
 from actuator_lti.loops.periodic import fundamental, shown
@@ -40,8 +42,9 @@ class LinearFigures:
     Definitions are those of `actuator_lti.stability_margins`, `actuator_lti.bandwidth` and
     `actuator_lti.step`. A design whose loop is unstable keeps its crossovers; its closed-loop figures
     are NaN, its delay margin is 0.
-    Closed-loop figures of the position loop are from command to output, feed-forward included; of a stage
-    with a law of one's own from its command to what it measures.
+    Closed-loop figures of the position loop are from command to output, feed-forward included, behind mean
+    and filter of the command where the nominal design has a mean (a limited jerk); of a stage with a law of
+    one's own from its command to what it measures.
     """
 
     loops: tuple[str, ...]  # that the structure has
@@ -221,11 +224,15 @@ def _figures_of(block: Block, lead: Any, time_figures: bool, rows: np.ndarray) -
 def _command_path(wired: Drive, stage: str) -> tuple[Any, Block | None]:
     """What stands between command and loop: a lead k_ff/(Kv T) of the position's, or else the whole response.
 
-    With a P controller that feeds back the output itself, T (1 + lead (1 - 1/z)) is that response.
+    With a P controller that feeds back the output itself, T (1 + lead (1 - 1/z)) is that response. Of a drive
+    whose command has a mean it is that to the reference, behind mean and filter.
     """
     if stage != "position":
         return 0.0, answer(wired, stage) if wired.answers_apart(stage) else None
-    law, T = wired.design.controller.position_loop, wired.period_s("position")
+    design, T = wired.design, wired.period_s("position")
+    if command_mean(design.nominal or design):
+        wired = wire(replace(design, command=Command()), wired.operating)
+    law = wired.design.controller.position_loop
     more = (law.derivative_time_s, law.acceleration_feedforward, wired.design.command.filter_time_s)
     plain = law.law is None and law.integral_time_s is None and not any(map(present, more))
     if plain and (wired.design.coupling is None or law.sensor == "output"):

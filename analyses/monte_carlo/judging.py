@@ -101,11 +101,11 @@ def left_out(requirement: Requirement, design: Design) -> str:
     loops = judged_loops(requirement.loop, design.controller.stages)
     if not QUANTITIES[requirement.quantity].of_response or "position" not in loops:
         return ""
-    if requirement.to == "reference":
-        filtered = design.command.filter_time_s > 0.0
-        return "figures of many designs have command.filter_time in them" if filtered else ""
-    mean = "figures of many designs lack the mean of command.jerk"
-    return f'{mean}, which to = "reference" leaves out' if command_mean(design) else ""
+    if command_mean(design) is not None:
+        mean = "figures of many designs lack the mean of command.jerk"
+        return "" if requirement.to == "reference" else f'{mean}, which to = "reference" leaves out'
+    filtered = requirement.to == "reference" and design.command.filter_time_s > 0.0
+    return "figures of many designs have command.filter_time in them" if filtered else ""
 
 
 def source_columns(requirement: Requirement, design: Design) -> tuple[str, ...]:

@@ -32,7 +32,7 @@ from reports.sections.names import command_unit
 from reports.sections.requirements import limit_words
 
 CONTACT = 'The coupling of the loops is in contact, its torque in the direction of motion ("driving").'
-MEAN = "Bandwidth and step of the position loop are those behind the mean of the command's profile."
+MEAN = "Bandwidth and step of the position loop are those behind the mean and the filter of the command."
 MAP = "The friction of the loops has the slope of the first piece of its map."
 OPEN = "The drive has no loop."
 COLUMNS, LEVELS = 18, 12  # cells of the map

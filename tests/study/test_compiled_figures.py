@@ -8,18 +8,21 @@ import pytest
 
 from actuator_lti import assemble_loops, closed_loop_bandwidth, load_design, stability_margins, step_figures
 from actuator_lti.batch import Population, linear_figures, variable_paths
-from actuator_lti.design import parameter_value, with_overrides, with_values
+from actuator_lti.design import Design, parameter_value, with_overrides, with_values
+from actuator_lti.design.loader import as_design
 from analyses.linear.loop_survey import MOST_STATES, survey_loops
 from tests.refusals import refused
 from tests.validation.random_drives import drives
 
 NAMES = ("ilr33-amber", "ilr33-amber-multirate", "ctms-motor-position", "emps")
+COMMAND = {"rate": "20 deg/s", "acceleration": "2000 deg/s^2", "jerk": "2e5 deg/s^3", "filter_time": "2 ms"}
+BEHIND = with_overrides(load_design("ilr33-amber"), {f"command.{key}": at for key, at in COMMAND.items()})
 
 
-def scattered(name: str, count: int, seed: int) -> Population:
+def scattered(name: Design | str, count: int, seed: int) -> Population:
     """Designs around a shipped one: plant by 30 %, gains by a factor of 5, any delay up to 2.7 ticks."""
     rng = np.random.default_rng(seed)
-    design = load_design(name)
+    design = as_design(name)
     values = {}
     for path in variable_paths(design):
         if path not in design.parameters or path.startswith(("gear", "limits", "encoder", "control.period")):
@@ -80,7 +83,7 @@ def test_every_crossover_is_that_of_the_margin_engine(population):
             assert figures.quantity(quantity, loop)[k] == pytest.approx(getattr(truth, name), rel=1e-6)
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", [*NAMES, pytest.param(BEHIND, id="behind mean and filter")])
 def test_bandwidths_peaks_and_steps_are_those_of_the_loops(name):
     population = scattered(name, 5, seed=8)
     figures = linear_figures(population)

@@ -170,12 +170,8 @@ static int one(int stage, double lead, int timed)
     return n;
 }
 
-/*
- * A loop and its figures; its states, 0 where the drive has no such loop, less where it cannot be had. Figures of
- * a closed position loop are from command to output, those of a stage with a law of one's own from its command, as
- * in actuator_lti.batch.
- */
-EXPORT("loop") int loop(int stage, int timed)
+/* A loop and its figures, the command of the drive in p going to its response as it is. */
+static int answered(int stage, int timed)
 {
     const double lead = (stage < COMMAND) ? drive_lead_of(p, stage) : 0.0;
     const int n = isnan(lead) ? one(stage, 0.0, 0) : one(stage, lead, timed);
@@ -193,6 +189,23 @@ EXPORT("loop") int loop(int stage, int timed)
         }
         drive_quoted(own->row, own->period, own->quoted);
     }
+    return n;
+}
+
+/*
+ * A loop and its figures; its states, 0 where the drive has no such loop, less where it cannot be had. Figures of
+ * a closed position loop are from command to output, behind mean and filter of a command with a mean, those of a
+ * stage with a law of one's own from its command, as in actuator_lti.batch.
+ */
+EXPORT("loop") int loop(int stage, int timed)
+{
+    const double filters = p[DRIVE_COMMAND_FILTERS];
+
+    if (stage == POSITION && p[DRIVE_PROFILE_SAMPLES] > 1.0) {
+        p[DRIVE_COMMAND_FILTERS] = 0.0;
+    }
+    const int n = answered(stage, timed);
+    p[DRIVE_COMMAND_FILTERS] = filters;
     return n;
 }
 
