@@ -18,7 +18,7 @@ from actuator_lti.drive.profile import command_mean
 from actuator_lti.drive.wiring import Drive, present, wire
 from actuator_lti.errors import InputError
 from actuator_lti.loops.periodic import fundamental, shown
-from actuator_lti.loops.sampled import answer, fundamental_path, stage_blocks
+from actuator_lti.loops.sampled import command_response, fundamental_path, stage_blocks
 from actuator_lti.loops.tick import Block, TickProgram
 
 _CHUNK = 256
@@ -228,7 +228,7 @@ def _command_path(wired: Drive, stage: str) -> tuple[Any, Block | None]:
     whose command has a mean it is that to the reference, behind mean and filter.
     """
     if stage != "position":
-        return 0.0, answer(wired, stage) if wired.answers_apart(stage) else None
+        return 0.0, command_response(wired, stage) if wired.responds_apart(stage) else None
     design, T = wired.design, wired.period_s("position")
     if command_mean(design.nominal or design):
         wired = wire(replace(design, command=Command()), wired.operating)

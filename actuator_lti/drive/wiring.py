@@ -73,7 +73,7 @@ class Drive:
         own = self.design.controller.own_law
         return own is not None and own[0] == stage and stage in self.stages
 
-    def answers_apart(self, stage: str) -> bool:
+    def responds_apart(self, stage: str) -> bool:
         """Whether L/(1 + L) need not be how an inner stage answers its command: its law may take more."""
         return stage != "position" and self.has_own_law(stage)
 

@@ -43,8 +43,8 @@ class Loop:
     T are the fundamental responses of the exact loop and L = T/S, see `actuator_lti.loops.periodic`.
     ``rotor``: "free" or "locked"; with a locked one there is a current loop alone.
     ``at_law``: whether it is the loop of a stage, cut at what a law of one's own gives.
-    ``plain_answer``: of an inner stage with such a law its response from its command to what it measures:
-    L/(1 + L) tells it only where the law takes nothing but the error; else None.
+    ``plain_command_response``: of an inner stage with such a law its response from command to measured value:
+    L/(1 + L) only where the law takes nothing but the error; else None.
     """
 
     name: str
@@ -58,7 +58,7 @@ class Loop:
     periodic: bool = False
     rotor: RotorState = "free"
     at_law: bool = False
-    plain_answer: Any = None
+    plain_command_response: Any = None
 
     @cached_property
     def open_loop(self) -> Any:
@@ -110,10 +110,10 @@ class Loop:
 
 
 def loop_of(
-    wired: Drive, place: str, parts: tuple[Any, Any, Any], answer: Any,
+    wired: Drive, place: str, parts: tuple[Any, Any, Any], own: Any,
     named: Callable[[Any, str, str, str], Any], period_s: float | None = None, *, periodic: bool = False,
 ) -> Loop:  # fmt: skip
-    """The loop of a stage, or at a break point, of L, T, S and what may answer its command, by ``named``."""
+    """The loop of a stage, or at a break point, of L, T, S and an ``own`` response to its command."""
     error, measured = wired.around(place)
     name = place if place in wired.stages else f"at {place}"
     label, unit = name.replace(" ", "_"), wired.unit(error)
@@ -124,7 +124,9 @@ def loop_of(
         plain_sensitivity=named(parts[2], f"{label}_sensitivity", "reference", error), period_s=period_s,
         unit_in=unit, unit_out=unit, periodic=periodic, rotor=wired.operating.rotor,
         at_law=wired.has_own_law(place),
-        plain_answer=None if answer is None else named(answer, f"{label}_answer", "command", place),
+        plain_command_response=(
+            None if own is None else named(own, f"{label}_command_response", "command", place)
+        ),
     )  # fmt: skip
 
 

@@ -18,7 +18,7 @@ from actuator_lti.loops import Loops
 from actuator_lti.types import Floats
 from analyses.large_signal.tones import full_range, settled_ticks, tone
 from analyses.limit_cycles import describing
-from analyses.limit_cycles.run import Confirmation, confirm
+from analyses.limit_cycles.run import CycleResult, confirm
 from analyses.linear.loop_figures import loop_figures
 from analyses.linear.responses import response_at
 from analyses.motion.settling import settle
@@ -46,7 +46,7 @@ class Counts:
     speed_step_rad_s: float | None  # by which a speed made of counts jumps (motor side), if it is
     ripple_rad_s: float  # largest (peak) that counts add to a constant speed of the motor; which
     ripple_at_rad_s: float
-    cycles: tuple[Confirmation, ...]  # predicted limit cycles, each with what the simulator says of it
+    cycles: tuple[CycleResult, ...]  # predicted limit cycles, each with what the simulator says of it
     linear_rad: float  # at the sensor, from which the gain of counts is 1 within 5 %, about any bias
     # Smallest amplitude tried from which the response to the command, at the bandwidth, is off by less than 5
     # % in the simulator: more, where counts shake the drive. ``None``: none up to 256 times as much, or the

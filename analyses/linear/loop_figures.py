@@ -131,16 +131,16 @@ def loop_figures(
     Raises `InputError`, `NumericalError`: if the margins cannot be found; another figure that cannot becomes
     a note.
     """
-    answers = response, loop.plain_answer, loop.plain_closed
-    response = next(one for one in answers if one is not None)
+    responses = response, loop.plain_command_response, loop.plain_closed
+    response = next(one for one in responses if one is not None)
     margins = stability_margins(loop.plain_open, certify=certify)
     if margins.stable is not True:
         return LoopFigures(loop, response, margins, None, None, None)
     bare = LoopFigures(loop, response, margins, None, peaks(loop.plain_open), None)
-    return _answering(bare, response, mean, bandwidth=bandwidth, step=step)
+    return _responding(bare, response, mean, bandwidth=bandwidth, step=step)
 
 
-def _answering(
+def _responding(
     figures: LoopFigures, response: Any, mean: CommandMean | None, *, bandwidth: bool = True, step: bool
 ) -> LoopFigures:
     """The same with bandwidth and step of a response, behind the mean of the command where there is one."""
@@ -299,6 +299,6 @@ def _position(loops: Loops, loop: Loop, *, step: bool, certify: bool) -> LoopFig
     if filtered:
         bare = replace(design, command=replace(design.command, filter_time_s=0.0))
         response = other_loops(loops, bare).plain_response
-    reference = _answering(figures, response, None, step=step)
+    reference = _responding(figures, response, None, step=step)
     said = (profile_note(design),) if mean else ()
     return replace(figures, reference=reference, notes=(*figures.notes, *said))

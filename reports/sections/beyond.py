@@ -9,7 +9,7 @@ import numpy as np
 from analyses.large_signal.conditional import Conditional, Prediction
 from analyses.large_signal.from_rest import RestSweep
 from analyses.limit_cycles.counts import WITHIN, Counts
-from analyses.limit_cycles.run import Confirmation
+from analyses.limit_cycles.run import CycleResult
 from reports import document as doc
 from reports.charts import style
 from reports.sections.limits import words_of
@@ -141,7 +141,7 @@ def _facts(one: Counts, axis: str) -> doc.Block:
     )
 
 
-def _cycles(cycles: Sequence[tuple[Counts, Confirmation]], out: Unit) -> doc.Block:
+def _cycles(cycles: Sequence[tuple[Counts, CycleResult]], out: Unit) -> doc.Block:
     columns = [
         doc.of(lambda pair: NAMES[pair[0].sensor], "sensor", "Sensor"),
         doc.of(lambda pair: pair[1].cycle.inner_rad, "amplitude", "Amplitude at the sensor", **out.column()),

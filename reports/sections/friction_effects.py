@@ -7,7 +7,7 @@ import numpy as np
 from actuator_lti.design.model import Command, Design
 from actuator_lti.drive.steady import torque_gain_Nm_rad
 from analyses.friction_effects.result import FrictionEffects, FrictionPoint
-from analyses.limit_cycles.run import Confirmation
+from analyses.limit_cycles.run import CycleResult
 from analyses.motion.settling import (
     FROM_THE_LARGEST,
     Settling,
@@ -57,7 +57,7 @@ def _cycle_verdict(design: Design, point: FrictionPoint, fine: Unit, load: str) 
     agree = "as predicted" if cycles.as_predicted else "not as predicted"
     if not cycles.described:
         agree += "; the describing function is refuted: a sinusoid spends no time at rest"
-    predicted = "; ".join(_predicted(item, fine) for item in cycles.confirmations) or "none"
+    predicted = "; ".join(_predicted(item, fine) for item in cycles.cycles) or "none"
     diverges = swing is not None and swing.rest.verdict == "diverging"  # of no size
     return doc.verdict(
         f"validation-hunting-{point.load_Nm:g}",
@@ -72,7 +72,7 @@ def _cycle_verdict(design: Design, point: FrictionPoint, fine: Unit, load: str) 
     )
 
 
-def _predicted(item: Confirmation, fine: Unit) -> str:
+def _predicted(item: CycleResult, fine: Unit) -> str:
     one = item.cycle
     kind = "stable" if one.stable else "unstable, the limit of what friction damps"
     seen = "" if item.ratio is None else f", simulated at {item.ratio:.2f} of that"

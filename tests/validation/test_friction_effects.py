@@ -179,7 +179,7 @@ def test_hunting_needs_breakaway_above_sliding_friction(breakaway: float, hunts:
     values = {"friction.breakaway_ratio": breakaway, "control.velocity.integral_time": 3e-3}
     design = with_values(AMBER, {**values, "control.position.gain": 250.0})
     cycles = limit_cycles(design, 0.0)
-    assert cycles.confirmations == ()
+    assert cycles.cycles == ()
     assert (cycles.hunting is not None) == hunts
     assert cycles.described == (not hunts)
     if cycles.hunting is not None:
@@ -192,7 +192,7 @@ def test_hunting_needs_breakaway_above_sliding_friction(breakaway: float, hunts:
 @pytest.mark.parametrize("load", [0.0, 8.0])
 def test_friction_keeps_an_unstable_loop_quiet_up_to_the_predicted_amplitude(load: float) -> None:
     """Speed gain beyond its margin: small motion dies out, large grows; border to 15 %, frequency to 8 %."""
-    (item,) = limit_cycles(with_values(AMBER, {"control.velocity.gain": 3.0}), load).confirmations
+    (item,) = limit_cycles(with_values(AMBER, {"control.velocity.gain": 3.0}), load).cycles
     assert not item.cycle.stable
     assert item.verdict == "confirmed"
     assert item.ratio == pytest.approx(1.0, rel=0.15)
