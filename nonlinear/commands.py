@@ -20,6 +20,7 @@ import numpy.typing as npt
 from actuator_lti.bounds import SIGNAL_ROWS, TONE_TICKS, TONES, Bound
 from actuator_lti.errors import InputError, finite_number, positive_number, shown, whole_number
 from actuator_lti.start.public_arguments import guard
+from actuator_lti.systems.root import root
 from actuator_lti.types import Floats, number_array
 from nonlinear._kernels import layout as at
 from nonlinear.native import fill
@@ -300,19 +301,16 @@ def _summed(frequency_hz: Floats, phases: Floats, t: Floats) -> Floats:
 
 def _first_rise(frequency_hz: Floats, phases: Floats, duration_s: float) -> float:
     """A time at which a sum of sines passes zero, rising: looked for block by block."""
-    from scipy.optimize import brentq
-
     count = 8 * int(np.ceil(frequency_hz.max() * duration_s))
     for first in range(0, count, _ROWS):
         t = np.arange(first, min(first + _ROWS, count) + 1, dtype=np.float64) * (duration_s / count)
         seen = _summed(frequency_hz, phases, t)
         rises = np.flatnonzero((seen[:-1] < 0.0) & (seen[1:] >= 0.0))
         if rises.size:
-            at_s = t[rises[0] : rises[0] + 2]
-            return float(
-                brentq(lambda x: float(_summed(frequency_hz, phases, np.array([x]))[0]), *at_s,
-                       xtol=1e-15 * duration_s)
-            )  # fmt: skip
+            low, high = t[rises[0] : rises[0] + 2]
+            return root(
+                lambda x: _summed(frequency_hz, phases, np.array([x]))[0], low, high, 1e-15 * duration_s
+            )
     raise AssertionError("a sum of sines without a mean rises somewhere in its period")
 
 

@@ -7,7 +7,6 @@ from typing import Any
 
 import flint
 import numpy as np
-from scipy.optimize import brentq
 
 from actuator_lti.bandwidth.measured import measured_bandwidth
 from actuator_lti.bandwidth.rational_response import RationalResponse
@@ -28,6 +27,7 @@ from actuator_lti.systems.delay_response import DelayResponse, plain_behind_dela
 from actuator_lti.systems.exact_response import dc_noise, shown
 from actuator_lti.systems.plain_system import PlainSystem
 from actuator_lti.systems.rest_mode import without_rest_mode
+from actuator_lti.systems.root import root
 from actuator_lti.types import Delay
 
 _FLOOR = 1e-6  # of the gain at zero frequency: the phase is followed down to it
@@ -189,5 +189,4 @@ def first_turn(loop: RationalLoop, delay_s: float, floor: float) -> float | None
             return float(np.angle(late.at(np.array([w]))[0] * sign))
 
         near = float(turns[0])
-        w = brentq(beyond, near * (1.0 - _NEAR), near * (1.0 + _NEAR), xtol=1e-300, rtol=1e-14)
-        return float(w)
+        return root(beyond, near * (1.0 - _NEAR), near * (1.0 + _NEAR))

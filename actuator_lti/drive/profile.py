@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from actuator_lti.design.model import Design
+from actuator_lti.systems.root import root
 
 RESOLVED = 1e-13  # of the command: what sin(k pi) leaves of a zero of the mean
 
@@ -42,12 +43,11 @@ class CommandMean:
     @property
     def minus3db_rad_s(self) -> float:
         """Where its gain is 1/sqrt(2): 2.783/(n T) for many samples."""
-        from scipy.optimize import brentq
 
         def over(half: float) -> float:
             return sin(self.samples * half) / (self.samples * sin(half)) - sqrt(0.5)
 
-        return 2.0 / self.period_s * float(brentq(over, 1e-9 / self.samples, pi / self.samples, xtol=1e-15))
+        return 2.0 / self.period_s * root(over, 1e-9 / self.samples, pi / self.samples)
 
 
 def command_mean(design: Design) -> CommandMean | None:

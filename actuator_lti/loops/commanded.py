@@ -10,7 +10,6 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from scipy.optimize import brentq
 
 from actuator_lti.bandwidth import Bandwidth, closed_loop_bandwidth
 from actuator_lti.drive.profile import CommandMean
@@ -21,6 +20,7 @@ from actuator_lti.margins.given import given_of
 from actuator_lti.margins.loop import loop_of, rational_loop
 from actuator_lti.step import StepFigures
 from actuator_lti.systems.delay_response import DelayResponse
+from actuator_lti.systems.root import root
 from actuator_lti.types import Real
 
 _OVER = 1e-9  # of the final value: less is no overshoot
@@ -88,7 +88,7 @@ class _Gain:
         w = self.factors.passages(0.0, top, math.log(level))
         edges = np.array([0.0, *(0.5 * (w[1:] + w[:-1])), top])  # one passage between two of them
         pairs = zip(np.maximum(0.5 * w, edges[:-1]), np.minimum(2.0 * w, edges[1:]), strict=True)
-        found = [brentq(lambda w: self.at(w) - level, *pair, xtol=1e-300, rtol=1e-14) for pair in pairs]
+        found = [root(lambda w: self.at(w) - level, *pair) for pair in pairs]
         return [self.loop.frequency(each) for each in found]
 
     def largest(self, end: float) -> tuple[float, float]:

@@ -23,6 +23,7 @@ from actuator_lti.loops.result import Loops
 from actuator_lti.loops.tick import Block, TickProgram, mean_response, siso, used
 from actuator_lti.systems.resolvent import balanced
 from actuator_lti.systems.rest_mode import System, without_rest_modes
+from actuator_lti.systems.root import root
 
 GAINS = np.geomspace(1.0, 1e4, 401)
 _AT_ONCE = 50
@@ -209,11 +210,11 @@ def first_limit(excess: Callable[[Any], Any], grid: np.ndarray, none: float, at_
         found = np.append(found, excess(part))
         for k in range(max(start - 1, 1), len(found)):
             if found[k] >= 0.0:
-                return _root(excess, grid[k - 1], grid[k])
+                return root(excess, grid[k - 1], grid[k])
             if k + 1 < len(found) and _may_reach_zero(found[k - 1 : k + 2]):
                 top = _top(excess, grid[k - 1], grid[k + 1])
                 if excess(top) >= 0.0:
-                    return _root(excess, grid[k - 1], top)
+                    return root(excess, grid[k - 1], top)
     return none
 
 
@@ -225,12 +226,6 @@ def _may_reach_zero(three: np.ndarray) -> bool:
     before, middle, after = three
     bend = 2.0 * middle - before - after
     return bool(abs(after - before) <= 2.0 * bend and -three.max() <= bend)
-
-
-def _root(excess: Callable[[Any], Any], low: float, high: float) -> float:
-    from scipy.optimize import brentq
-
-    return float(brentq(excess, low, high, xtol=1e-15, rtol=1e-13))
 
 
 def _top(excess: Callable[[Any], Any], low: float, high: float) -> float:

@@ -5,7 +5,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.linalg.lapack import dgeev
-from scipy.sparse.csgraph import connected_components
 
 from actuator_lti.errors import NumericalError
 from actuator_lti.types import Complex, Ints, Mask, Real
@@ -71,8 +70,12 @@ def all_sorted(matrices: Sequence[Real], in_z: bool) -> list[SortedPoles]:
 
 def diagonal_blocks(A: Real) -> list[Ints]:
     """States that act upon each other, directly or not: those of a chain of delays act one way alone."""
-    count, label = connected_components(A != 0.0, connection="strong")
-    return [np.flatnonzero(label == k) for k in range(count)]
+    n = len(A)
+    reached = np.eye(n) + (A != 0.0)
+    for _ in range(n.bit_length()):  # twice as many steps each time
+        reached = np.sign(reached @ reached)
+    first = (reached * reached.T).argmax(axis=1)
+    return [np.flatnonzero(first == k) for k in np.unique(first)]
 
 
 def _by_parts(A: Real, in_z: bool, whole: SortedPoles) -> SortedPoles:

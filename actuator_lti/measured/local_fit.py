@@ -10,7 +10,6 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
-from scipy.special import gammaincinv
 
 from actuator_lti.measured.bounds import CURVATURE, bend, unresolved_intervals
 from actuator_lti.measured.response import CONFIDENCE, GAUSSIAN
@@ -67,6 +66,8 @@ def _lines(u: Real, y: Complex, ratio: Real, apart: Mask, at: Ints, half: int) -
     The radius is infinite where the window holds a resonance between two points, a value lost in noise, or
     values farther off their parabola than their noise in 99 of 100 cases.
     """
+    from scipy.special import gammaincinv  # takes longer to load than all else that most commands need
+
     offset = np.arange(-half, half + 1)
     window = at[:, None] + offset
     there = (window >= 0) & (window < u.size)

@@ -5,7 +5,6 @@ from typing import Any
 
 import numpy as np
 from flint import acb_mat
-from scipy.interpolate import BarycentricInterpolator
 
 from actuator_lti.errors import InputError, NumericalError
 from actuator_lti.margins.delays.form import DelayForm, delay_form
@@ -76,7 +75,9 @@ def collocated(form: DelayForm, points: int) -> Real:
     n, q = form.states, form.delays_s.size
     inner = form.whole[:-1, :-1]
     x = 0.5 * (1.0 - np.cos(np.pi * np.arange(points + 1) / points))
-    D = BarycentricInterpolator(x, np.eye(points + 1)).derivative(x)[1:]
+    weight = np.array([0.5, *(-1.0) ** np.arange(1, points), 0.5 * (-1.0) ** points])
+    D = weight / weight[:, None] / (x[:, None] - x + np.eye(points + 1))
+    D = (D - np.diag(D.sum(axis=1)))[1:]  # Berrut and Trefethen, SIAM Review 46, 2004, section 9.3
     ends = np.kron(np.eye(q), np.eye(points)[-1:])
     rates = np.diag(-1.0 / form.delays_s)
     begins = np.kron(rates, D[:, :1])

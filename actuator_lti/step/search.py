@@ -4,8 +4,8 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from scipy.optimize import brentq
 
+from actuator_lti.systems.root import root
 from actuator_lti.types import Mask, Real
 
 OVER = 1e-9  # an excess below this part of the final value is no overshoot
@@ -62,7 +62,7 @@ def _zeros(f: np.poly1d) -> list[float]:
     if not f.order or abs(f.coeffs[-1]) > np.abs(f.coeffs[:-1]).sum():
         return []
     return [
-        float(brentq(f, low, high, xtol=1e-15))
+        root(f, low, high, 1e-15)
         for low, high in pairwise((0.0, *_zeros(f.deriv()), 1.0))
         if min(f(low), f(high)) <= 0.0 <= max(f(low), f(high))
     ]

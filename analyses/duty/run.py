@@ -118,7 +118,7 @@ class Duty:
 PERIODS, MANY = 3, 32  # of the motion that pass at least before one is taken; that are taken at the most
 STEADY = 1e-4  # of the rms current: it differs by less, in no printed digit, after twice as many periods
 MOST_TICKS = 2_000_000
-MOST_WAITED = 10 * MOST_TICKS  # some seconds
+MOST_WORK = 10 * MOST_TICKS  # ticks that are waited, and integration steps within them: some seconds
 MOST_CYCLES = 2**40
 _DRAWN = 200
 
@@ -190,11 +190,11 @@ def _cycle(design: Design, asked: Asked) -> tuple[Piece, Piece | None, bool]:
     gone, before, settling = 0, inf, settling_ticks_of(design, STEADY)
     wait = max(PERIODS * taken // periods, ceil(settling) if settling < inf else 0)
     while True:
-        while gone < min(wait, MOST_WAITED):
+        while gone < wait and drive.work < MOST_WORK:
             piece, gone = _went_well(drive.advance(taken)), gone + taken
         rms = float(np.sqrt(np.mean(piece.signal("current_A") ** 2)))
         steady = abs(rms - before) <= STEADY * rms
-        if steady or wait >= MOST_WAITED:
+        if steady or drive.work >= MOST_WORK:
             break
         wait, before = 2 * gone, rms
     if asked.share == 1.0:

@@ -4,10 +4,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from scipy.optimize import brentq
 from scipy.signal import lfilter
 
 from actuator_lti.errors import InputError
+from actuator_lti.systems.root import root
 from actuator_lti.types import Floats
 from analyses.estimation.fit import Fit
 from analyses.estimation.series import autocovariance
@@ -224,7 +224,7 @@ def between_records(values: Sequence[float], stds: Sequence[float] | Floats) -> 
 
     if excess(0.0) <= 0.0:
         return 0.0
-    return float(np.sqrt(brentq(excess, 0.0, float(np.ptp(x)) ** 2 * len(x), xtol=1e-300, rtol=1e-12)))
+    return float(np.sqrt(root(excess, 0.0, float(np.ptp(x)) ** 2 * len(x))))
 
 
 def by_record(estimates: Sequence[Fit], names: Sequence[str]) -> dict[str, tuple[float, float]]:

@@ -144,8 +144,12 @@ def _worse(first: FailureCase, second: FailureCase) -> FailureCase:
 
 
 def _hold(split: SplitDrive, start: float, wait: int, most: int, swing: float) -> None:
-    """Hold a start until what it orders spans over ``wait`` ticks `SETTLED` of its size beside its swing."""
+    """Hold a start until what it orders spans over ``wait`` ticks `SETTLED` of its size beside its swing.
+
+    Whole periods of the controller: a failure comes as its outermost stage runs, when it does the most.
+    """
     whole = split.whole(start)
+    wait = ceil(wait / whole.base_ticks) * whole.base_ticks
     for _ in range(0, most, wait):
         piece = whole.advance(wait)
         if piece.status != "ok":

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.linalg import expm
-from scipy.optimize import brentq
 
+from actuator_lti.systems.root import root
 from actuator_lti.types import Floats
 
 TRIED = 32  # lengths of a stand, of which the first that is long enough is closed in
@@ -46,7 +46,7 @@ class Orbit:
         low = 0.0
         for time in np.linspace(0.0, self.half_s, TRIED):
             if self._surplus(time) >= 0.0:
-                return float(brentq(self._surplus, low, time, xtol=1e-14 * time)) if time else 0.0
+                return root(self._surplus, low, time, 1e-14 * time) if time else 0.0
             low = time
         return None
 

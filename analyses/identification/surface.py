@@ -4,9 +4,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from scipy.optimize import brentq
 
 from actuator_lti.errors import InputError, NumericalError
+from actuator_lti.systems.root import root
 from actuator_lti.types import Floats
 from analyses.estimation.fit import Fit, Fixed
 from analyses.estimation.least_squares import told_apart
@@ -177,7 +177,7 @@ class _Runs:
         if first <= 0.0:
             return 0.0, birge
         most = 10.0 * float(np.var(y - x @ np.linalg.lstsq(x, y, rcond=None)[0])) + float(np.max(own))
-        return float(brentq(excess, 0.0, most, xtol=1e-9 * most)), birge
+        return root(excess, 0.0, most, 1e-9 * most), birge
 
 
 def _fitted(

@@ -13,13 +13,13 @@ from math import asin, ceil, inf, isfinite, pi, sqrt
 from typing import Any, Literal
 
 import numpy as np
-from scipy.optimize import brentq
 
 from actuator_lti.design.model import Design
 from actuator_lti.drive.steady import back_emf_Nms_rad, drive_gain, voltage_limit_torque_Nm
 from actuator_lti.drive.wiring import wire
 from actuator_lti.loops import ExactMargins, Loops, exact_margins, periodic_loop
 from actuator_lti.loops.periodic import PeriodicLoop
+from actuator_lti.systems.root import root
 from actuator_lti.types import Floats
 from analyses.motion.settling import accepted_rad, settle, step_rows
 from nonlinear import LIMITERS, Rows
@@ -91,7 +91,7 @@ def saturation_gain(ratio: float) -> float:
 
 def saturation_ratio(gain: float) -> float:
     """Amplitude over limit at which saturation has so much gain left (0 < gain <= 1)."""
-    return 1.0 if gain >= 1.0 else float(brentq(lambda a: saturation_gain(a) - gain, 1.0, 4.0 / gain))
+    return 1.0 if gain >= 1.0 else root(lambda a: saturation_gain(a) - gain, 1.0, 4.0 / gain)
 
 
 def conditional_stability(design: Design, loops: Loops) -> Conditional:

@@ -19,7 +19,6 @@ from typing import Literal, TypeGuard
 
 import numpy as np
 import numpy.typing as npt
-from scipy.optimize import brentq
 
 from actuator_lti.design.model import Coupling, Design, Filter, Friction, LoadFriction, Sensor
 from actuator_lti.drive.operating import Operating, dead_zone, described_dry, dry_torque, slope_at
@@ -27,6 +26,7 @@ from actuator_lti.drive.wiring import wire
 from actuator_lti.loops import assemble_loops
 from actuator_lti.loops.periodic import exact_margins, point_blocks
 from actuator_lti.loops.tick import TickProgram
+from actuator_lti.systems.root import root
 
 Cause = Literal["play", "quantisation", "motor-quantisation", "friction"]
 # The sensor whose counts they are, and the other one
@@ -136,10 +136,10 @@ def kept_up(
                 return found.radius - 1.0 if _settled(found) else -1.0
 
             if _changes(excess(low), excess(value)):
-                root = float(brentq(excess, low, value, xtol=1e-12))
-                there = mode(root, last)
+                at = root(excess, low, value, 1e-12)
+                there = mode(at, last)
                 if _settled(there) and abs(there.radius - 1.0) < _JUMP:
-                    yield root, there, last.radius > 1.0
+                    yield at, there, last.radius > 1.0
         last = now
 
 

@@ -13,7 +13,6 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.optimize import brentq
 
 from actuator_lti.design.model import Design
 from actuator_lti.drive.operating import straight
@@ -21,6 +20,7 @@ from actuator_lti.drive.steady import steady_input
 from actuator_lti.loops import Loops, assemble_loops
 from actuator_lti.loops.assemble import loops_at
 from actuator_lti.loops.simulation import TickSystem
+from actuator_lti.systems.root import root
 from actuator_lti.types import Floats
 from analyses.large_signal.tones import settling_ticks_in_periods
 
@@ -95,7 +95,7 @@ def stick_slip_cycle(design: Design, load_Nm: float, loops: Loops | None = None)
     if not falls.size:
         return None
     k = int(falls[-1])
-    error = float(brentq(surplus, grid[k], grid[k + 1], xtol=1e-12 * grid[k]))
+    error = root(surplus, grid[k], grid[k + 1], 1e-12 * grid[k])
     result = slip.from_error(error)
     if result is None or not math.isfinite(result[1]):
         return None

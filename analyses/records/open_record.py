@@ -9,12 +9,13 @@ from pathlib import Path
 from typing import Any
 
 from actuator_lti.errors import InputError
+from actuator_lti.files.matlab import MatContent
 from actuator_lti.files.reading import UTF_16, as_path, open_regular, shown, shown_path
 from analyses.records.campaign_file import RECORDS, record_spec, records_table
 from analyses.records.csv_stream import STAMP, text_of
 from analyses.records.inputs import spec_of_names
 from analyses.records.naming import is_unit
-from analyses.records.readers import TABLES, columns_of, load_mat, names_in, read_record
+from analyses.records.readers import Held, columns_of, held_in, names_in, read_record
 from analyses.records.record import Record
 from analyses.records.spec import CsvFormat, RecordSpec, SignalColumn, TimeColumn
 from analyses.toml_tables import Table
@@ -72,15 +73,14 @@ def open_records(path: str | Path) -> list[Record]:
     Raises `InputError`: names the file and what is wrong, or how to describe it.
     """
     path = as_path(path)
-    suffix = path.suffix.lower()
-    if suffix == ".toml":
+    if path.suffix.lower() == ".toml":
         return _described(path)
-    if not suffix and not path.exists():  # as designs are named
+    if not path.suffix and not path.exists():  # as designs are named
         raise InputError(f"is no file; allowed: {RECORDS}", where=str(path))
     if path.is_file() and path.stat().st_size == 0:
         raise InputError("is empty; allowed: a line of names, then rows of numbers", where=str(path))
-    spec, why = _spec_of_file(path, suffix)
-    record = read_record(path, spec)
+    spec, why = _spec_of_file(path, held := held_in(path))
+    record = read_record(path, spec, held)
     gain = record.constants.get("gtau")
     if gain is not None and "voltage" in record.signals:  # the force of an EMPS record
         signals = {**record.signals, "force": gain * record["voltage"]}
@@ -115,9 +115,9 @@ def _read_as_told(path: Path, own: Table) -> Record:
     if own.data["signals"] or not set(own) <= {*BESIDE, *BY_ROW}:
         rest = {key: value for key, value in own.data.items() if key not in ("file", "settings")}
         return read_record(path, record_spec(Table(rest, own.path, own.origin)))
-    known, _ = _spec_of_file(path, path.suffix.lower())
+    known, _ = _spec_of_file(path, held := held_in(path))
     given = {key: getattr(known, key) for key in ("format", "time", "signals")}
-    return read_record(path, own.read(RecordSpec, beside=BESIDE, **given))
+    return read_record(path, own.read(RecordSpec, beside=BESIDE, **given), held)
 
 
 def _settings(table: Table) -> dict[str, str | float]:
@@ -133,12 +133,12 @@ def _settings(table: Table) -> dict[str, str | float]:
     return found
 
 
-def _spec_of_file(path: Path, suffix: str) -> tuple[RecordSpec, Mapping[str, str]]:
+def _spec_of_file(path: Path, held: Held) -> tuple[RecordSpec, Mapping[str, str]]:
     """The layout of a file from the names in it; for each column that is not read: why."""
     spec: RecordSpec | None = None
     why: Mapping[str, str] = {}
-    if suffix == ".mat":
-        content, _ = load_mat(path)
+    content = None if held is None else held[0]
+    if isinstance(content, MatContent):
         if set(content.arrays) >= EMPS_COLUMNS:
             return EMPS_SPEC, {}
         named = {key: names_in(content, one.shape[1]) for key, one in content.arrays.items() if one.ndim == 2}
@@ -147,8 +147,8 @@ def _spec_of_file(path: Path, suffix: str) -> tuple[RecordSpec, Mapping[str, str
         # vectors by name, then each matrix with names
         while spec is None and (layout := next(layouts, None)):
             spec, why = spec_of_names(tuple(columns_of(content, layout, path)), layout)
-    elif suffix in TABLES:
-        spec, why = spec_of_names(tuple(TABLES[suffix](path)[0]))
+    elif content is not None:
+        spec, why = spec_of_names(tuple(content))
     else:
         with open_regular(path, "record") as stream:
             data = stream.read(HEAD_BYTES)

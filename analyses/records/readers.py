@@ -107,19 +107,26 @@ TABLES = {".parquet": load_parquet, ".pq": load_parquet, ".json": load_json}
 """What gives the columns of a file by name, and its SHA-256, by its ending."""
 
 
-def read_record(path: Path, spec: RecordSpec) -> Record:
+Held = tuple[MatContent | Mapping[str, Floats], str] | None
+"""What a file holds that is read whole, and its SHA-256; None of one that is read row by row."""
+
+
+def held_in(path: Path) -> Held:
+    suffix = path.suffix.lower()
+    return load_mat(path) if suffix == ".mat" else TABLES[suffix](path) if suffix in TABLES else None
+
+
+def read_record(path: Path, spec: RecordSpec, held: Held = None) -> Record:
     """A record of any kind, by the file's ending; scalars of a MATLAB file become ``constants``.
 
     Its columns are variable names (``group.field`` for those of a structure), or columns of the matrix that
-    ``spec.format.matrix`` names.
+    ``spec.format.matrix`` names. ``held``: what the file holds, where that is read already.
     """
-    suffix = path.suffix.lower()
-    if suffix == ".mat":
-        content, digest = load_mat(path)
-        constants = {k: float(v.ravel()[0]) for k, v in content.arrays.items() if v.size == 1}
-        record = record_of_columns(columns_of(content, spec.format, path), spec, path, digest)
-        return replace(record, constants=constants)
-    if suffix in TABLES:
-        vectors, digest = TABLES[suffix](path)
-        return record_of_columns(vectors, spec, path, digest)
-    return read_csv_record(path, spec)
+    if (held := held or held_in(path)) is None:
+        return read_csv_record(path, spec)
+    content, digest = held
+    if not isinstance(content, MatContent):
+        return record_of_columns(content, spec, path, digest)
+    constants = {k: float(v.ravel()[0]) for k, v in content.arrays.items() if v.size == 1}
+    record = record_of_columns(columns_of(content, spec.format, path), spec, path, digest)
+    return replace(record, constants=constants)

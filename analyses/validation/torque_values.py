@@ -10,12 +10,12 @@ from itertools import pairwise, product
 from math import copysign, isfinite, tanh
 
 import numpy as np
-from scipy.optimize import bisect
 
 from actuator_lti.design.model import Command, Controller, Design, Instruments, Limits, Motor
 from actuator_lti.design.plant import reachable_speed
 from actuator_lti.drive.facts import stall_torque_Nm
 from actuator_lti.drive.operating import dry_torque
+from actuator_lti.systems.root import root
 from analyses.validation.row import WITHIN, Row, judged
 from nonlinear.bench.operating_motion import OperatingMotion, operating_motion_at
 from nonlinear.rows import Rows
@@ -59,7 +59,7 @@ def edge(passed: Callable[[float], bool], predicted: float, beside: float, far: 
         near, out = 2.0 * predicted - far, far
         if passed(near) or not passed(out):
             return None
-    return float(bisect(lambda x: passed(x) - 0.5, near, out, xtol=1e-13 * max(abs(near), abs(out))))
+    return root(lambda x: passed(x) - 0.5, near, out, 1e-13 * max(abs(near), abs(out)))
 
 
 def loads_of(design: Design) -> tuple[float, ...]:

@@ -5,6 +5,8 @@ import re
 from collections.abc import Sequence
 from contextlib import suppress
 from difflib import SequenceMatcher
+from functools import cache
+from itertools import pairwise
 
 import tomlkit
 
@@ -48,17 +50,33 @@ def _written_anew(text: str, keys: Sequence[Tree], places: Sequence[Patch]) -> s
 
 
 def _patches(design: Design, keys: Sequence[Tree], text: str) -> list[Patch]:
-    parsed = pickle.dumps(tomlkit.parse(text))  # each key changes a copy: made so it takes a fifth of parsing
-    return [_patch(design, key["path"], text, pickle.loads(parsed)) for key in keys]
+    tables, parsed = _tables(text), cache(lambda part: pickle.dumps(tomlkit.parse(part)))
+    places = [(key["path"], *tables.get(key["path"].split(".")[0], (0, len(text)))) for key in keys]
+    # each key changes a copy, of its own tables alone
+    return [
+        _patch(design, path, text, start, stop, pickle.loads(parsed(text[start:stop])))
+        for path, start, stop in places
+    ]
 
 
-def _patch(design: Design, path: str, text: str, tree: tomlkit.TOMLDocument) -> Patch:
+def _tables(text: str) -> dict[str, tuple[int, int]]:
+    """From where to where the tables of each first name stand, unless entries stand before all of them."""
+    heads = [(head[1], head.start()) for head in re.finditer(r"(?m)^\[\[?\s*([A-Za-z][\w-]*)", text)]
+    found: dict[str, tuple[int, int]] = {}
+    if re.search(r"(?m)^[^#\n]*=", text[: heads[0][1]] if heads else text):
+        return found
+    for (name, start), (_, stop) in pairwise([*heads, ("", len(text))]):
+        found[name] = (found.get(name, (start,))[0], stop)
+    return found
+
+
+def _patch(design: Design, path: str, text: str, start: int, stop: int, tree: tomlkit.TOMLDocument) -> Patch:
     """Give the lines in which a text differs from that with a key changed, the latter cut at the value."""
     override(tree, path, MARK, design)
-    old, new = (each.splitlines(keepends=True) for each in (text, tomlkit.dumps(tree)))
+    old, new = (each.splitlines(keepends=True) for each in (text[start:stop], tomlkit.dumps(tree)))
     edits = [one for one in SequenceMatcher(None, old, new, False).get_opcodes() if one[0] != "equal"]
     (_, first, _, begins, _), (_, _, last, _, ends) = edits[0], edits[-1]
-    begin, end = (sum(map(len, old[:line])) for line in (first, last))
+    begin, end = (start + sum(map(len, old[:line])) for line in (first, last))
     before, _, after = "".join(new[begins:ends]).partition(f'"{MARK}"')
     table, _, key = path.rpartition(".")
     if begin == end and (head := re.search(rf"(?m)^\[{re.escape(table)}\].*\n", text)):  # a key that is new

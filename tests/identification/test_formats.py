@@ -18,7 +18,9 @@ from scipy.io import savemat
 
 from actuator_lti.errors import InputError
 from actuator_lti.files.matlab import read_mat
+from actuator_lti.files.reading import read_bytes
 from analyses.records import csv_stream as module
+from analyses.records import readers
 from analyses.records.csv_stream import BoundedRows, read_csv_record, stream_csv
 from analyses.records.open_record import open_record
 from analyses.records.record import Record
@@ -120,9 +122,14 @@ FORMATS: dict[str, Callable[[Path], object]] = {
 
 
 @pytest.mark.parametrize("form", FORMATS)
-def test_one_record_in_many_formats(form: str, tmp_path) -> None:
+def test_one_record_in_many_formats(form: str, tmp_path, monkeypatch: pytest.MonkeyPatch) -> None:
     FORMATS[form](tmp_path)
+    times = list[Path]()
+    monkeypatch.setattr(
+        readers, "read_bytes", lambda path, *more: times.append(path) or read_bytes(path, *more)
+    )
     record = open_record(next(tmp_path.glob("r.*")))
+    assert len(times) <= 1  # of each that is read whole
     assert record.time_s == pytest.approx(TIME, abs=1e-9)
     assert record["angle"] == pytest.approx(ANGLE, abs=1e-9)
     assert record["current"] == pytest.approx(CURRENT, abs=1e-9)

@@ -1,6 +1,7 @@
 """Step figures against closed forms, with delays by the method of steps; phases unwrapped by factors."""
 
 import math
+from collections.abc import Callable
 
 import control
 import numpy as np
@@ -15,6 +16,7 @@ from actuator_lti.margins.exact import roots
 from actuator_lti.step import step_figures
 from actuator_lti.systems.delay_system import DelaySystem
 from actuator_lti.systems.phase import unwrapped_phase_deg
+from actuator_lti.systems.root import root
 from tests.refusals import refused
 
 s = control.tf("s")
@@ -191,3 +193,24 @@ def test_a_loop_over_many_ticks_has_figures_of_few_digits(monkeypatch: pytest.Mo
     part = np.array(y) / found.final_value
     assert 100.0 * (part.max() - 1.0) == pytest.approx(found.overshoot_percent, abs=1e-6)
     assert found.settling_time_s / closed.dt == pytest.approx(np.flatnonzero(abs(part - 1.0) > 0.02)[-1] + 1)
+
+
+@pytest.mark.parametrize(
+    ("of", "low", "high", "exact"),
+    [
+        (lambda x: x * x - 2.0, 2.0, 0.0, math.sqrt(2.0)),
+        (lambda x: math.exp(x) - 1e-9, -100.0, 3.0, math.log(1e-9)),
+        (lambda x: (x - 0.3) ** 9, 0.0, 1.0, 0.3),
+        (lambda x: -1.0 if x < 1.0 / 3.0 else 1.0, 0.0, 1.0, 1.0 / 3.0),
+        (lambda x: math.inf if x > 2.0 else x - 1.0, 0.0, 9.0, 1.0),
+        (lambda x: x - 5.0, 5.0, 7.0, 5.0),
+    ],
+)
+def test_a_root_to_four_units_in_its_last_place(
+    of: Callable[[float], float], low: float, high: float, exact: float
+) -> None:
+    asked: list[float] = []
+    assert root(lambda x: of(asked.append(x) or x), low, high) == pytest.approx(exact, rel=2.0**-50)
+    assert len(asked) <= 60  # as many as halving takes
+    with pytest.raises(NumericalError, match="no change of sign"):
+        root(of, 1e2, 2e2)

@@ -41,6 +41,14 @@ def test_two_halves_without_a_failure_are_the_drive(name: str) -> None:
         assert [one.current_A for one in seen] == run.current_A[begun:].tolist()
 
 
+def test_a_command_that_jumps_is_seen_at_once_however_long_the_drive_has_waited() -> None:
+    """The step of the drive from rest, to the bit: it had come up to a period of the position loop late."""
+    design = load_design("ilr33-amber-multirate")
+    result = failures(design, Asked.of(design)).case("hard-over-command")
+    run = simulate(design, commands.step(design.validation.full_deflection_rad), 0.02)
+    assert result.deflection_rad[:200].tolist() == run.output_angle_rad[:200].tolist()
+
+
 def test_hard_over_is_the_motor_on_the_bus() -> None:
     """Rigid, dry friction constant while it moves: di, dw, dth linear in (i, w, th, 1), after the delay d."""
     design, U = AMBER, AMBER.limits.voltage_V

@@ -15,13 +15,14 @@ from actuator_lti.asked.verdict import Verdict
 from actuator_lti.design import with_overrides, with_values
 from actuator_lti.drive.steady import motor_torque_Nm
 from analyses.duty import Asked, duty
-from analyses.duty.run import heating
+from analyses.duty.run import MOST_WORK, heating
 from analyses.friction_effects import friction_effects
 from analyses.large_signal import large_signals
 from analyses.specification import Specification, specification
 from analyses.specification.capability import drive_figures, thermal_duty, torque_speed_plane
 from nonlinear import Trajectory, commands, simulate
 from nonlinear.bench.operating_motion import on_the_bench
+from nonlinear.runs.running import Piece, Running
 from reports import document as doc
 from reports.charts.svg import draw_svg
 from reports.sections import friction_effects as friction_section
@@ -233,11 +234,27 @@ def test_a_slow_integral_is_waited_for_or_the_duty_is_not_judged(monkeypatch: py
     held = run(brentq(error, -0.1, 0.1)).current_A[-ticks:]
     assert result.steady
     assert result.rms_A == pytest.approx(np.sqrt(np.mean(held**2)), rel=5e-4)
-    monkeypatch.setattr("analyses.duty.run.MOST_WAITED", 10 * ticks)
+    monkeypatch.setattr("analyses.duty.run.MOST_WORK", 10 * ticks)
     short = duty(design, asked)
     assert (short.steady, short.rated) == (False, Verdict.NOT_PROVEN)
     assert "not judged" in section(short)["result"]
     assert "is not steady" in section(short)["result"]
+
+
+def test_a_wait_is_counted_in_integration_steps(monkeypatch: pytest.MonkeyPatch) -> None:
+    """An unstable current loop in smoothed friction takes hundreds of steps a tick, and never repeats."""
+    work, advance = list[int](), Running.advance
+
+    def watched(drive: Running, ticks: int) -> Piece:
+        piece = advance(drive, ticks)
+        work.append(drive.work)
+        return piece
+
+    monkeypatch.setattr(Running, "advance", watched)
+    result = duty(load_design("ilr33-amber-tanh").with_values({"control.current.gain": "200 mohm"}))
+    assert not result.steady
+    assert max(np.diff(work)) > 100 * result.time_s.size
+    assert work[-2] < MOST_WORK <= work[-1]
 
 
 def test_a_rest_goes_on_from_the_motion_and_a_period_of_no_whole_ticks_is_played_as_asked() -> None:

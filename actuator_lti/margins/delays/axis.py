@@ -7,15 +7,14 @@ from functools import partial
 from itertools import pairwise
 
 from flint import acb, acb_poly, arb, arb_poly, fmpq, fmpq_poly
-from scipy.optimize import brentq, minimize_scalar
 
 from actuator_lti.errors import NumericalError
 from actuator_lti.margins.delays.exact import HIGHEST_ORDER, ExactDelayLoop
 from actuator_lti.margins.distances import Distance, Place
+from actuator_lti.systems.root import root
 
 _MOST_INTERVALS = 60_000
 _NARROWEST = 1e-13
-_SHARPEST = 9e-16
 _PER_DECADE = 5
 _ODD = 0.9137236158
 J = acb(0, 1)
@@ -155,7 +154,7 @@ def _root(axis: Axis, q: Form, low: float, high: float) -> list[arb]:
         raise NumericalError(f"a crossing at {low:.10g} rad/s itself could not be determined")
     if (a > 0) == (b > 0):
         return []
-    return [arb(brentq(lambda x: float((value(x) / (b - a)).mid()), low, high, xtol=1e-300, rtol=_SHARPEST))]
+    return [arb(root(lambda x: float((value(x) / (b - a)).mid()), low, high))]
 
 
 def _order(series: fmpq_poly, first: int) -> int:
@@ -197,6 +196,8 @@ def smallest(axis: Axis, distance: Distance, start: Place = NOWHERE, top: float 
     Under a delay 1 + L comes nearer than at infinity somewhere, however far; the last of `_AT_END` is how
     small a difference is looked for.
     """
+    from scipy.optimize import minimize_scalar  # takes a tenth of a short command to load
+
     loop, at_end, somewhere = axis.loop, distance.at_no_gain, 10.0 * axis.loop.lowest
     value, w = min(
         start, (at_end, math.inf), _at_rest(axis, distance), (_value(axis, distance, somewhere), somewhere)
