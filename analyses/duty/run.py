@@ -258,11 +258,11 @@ def _overload(design: Design, asked: Asked, current: Floats, held: float) -> Ove
     def cycle(x: float) -> tuple[float, float]:
         """Largest in the cycle that begins with x, in its first or last period or its rest; its end."""
         last = after(x, periods)
-        courses = [decay * start + gained for start in (x, after(x, periods - 1), last)]
-        courses[2] = courses[2][:part]
-        end = float(courses[2][-1]) if part else last
+        levels = [decay * start + gained for start in (x, after(x, periods - 1), last)]
+        levels[2] = levels[2][:part]
+        end = float(levels[2][-1]) if part else last
         end = still + (end - still) * cooled
-        return max(end, *(float(one.max(initial=0.0)) for one in courses)), end
+        return max(end, *(float(one.max(initial=0.0)) for one in levels)), end
 
     start = cycle(0.0)[1]
     slope = cycle(1.0)[1] - start  # of the state after a cycle over that before
@@ -316,5 +316,5 @@ def heating(design: Design, rms_A: float) -> Heating | None:
         reached = tau * over / start if share == 0.0 else -tau * log(1.0 - over * share / start) / share
     last = 5.0 * tau / share if share > 0.0 else (reached or tau)
     time = np.linspace(0.0, last, _DRAWN)
-    course = after(time) if tau > 0.0 else np.full(_DRAWN, final)
-    return Heating(loss, final, limit, max(reached, 0.0) if reached is not None else None, time, course)
+    temperature = after(time) if tau > 0.0 else np.full(_DRAWN, final)
+    return Heating(loss, final, limit, max(reached, 0.0) if reached is not None else None, time, temperature)

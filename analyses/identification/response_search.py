@@ -160,7 +160,8 @@ class Search:
                 lambda part: self.off(at(part)[None])[0],
                 here.x[free], slopes, near, max_nfev=ROUNDS, **options,
             )  # fmt: skip
-            ended = np.choose(1 + found.active_mask, [near[0], found.x, near[1]])
+            side = 1 + found.active_mask.astype(int)  # of floats, where nothing has a bound
+            ended = np.choose(side, [near[0], found.x, near[1]])
             before, here = here, self.at(at(ended))
             if np.all(np.abs(here.x - before.x) <= 0.5 * self.most):
                 break
