@@ -351,5 +351,5 @@ def heating(design: Design, rms_A: float) -> Heating | None:
         reached = tau * over / start if share == 0.0 else -tau * log(1.0 - over * share / start) / share
     last = 5.0 * tau / share if share > 0.0 else (reached or tau)
     time = np.linspace(0.0, last, _DRAWN)
-    course = after(time) if tau > 0.0 else np.full(_DRAWN, final)
-    return Heating(loss, final, limit, max(reached, 0.0) if reached is not None else None, time, course)
+    temperature = after(time) if tau > 0.0 else np.full(_DRAWN, final)
+    return Heating(loss, final, limit, max(reached, 0.0) if reached is not None else None, time, temperature)

@@ -40,7 +40,7 @@ class Move:
 def mending(point: WeakPoint, survey: LoopSurvey, corners: Corners | None = None) -> Move | None:
     """Find the least move of one gain that brings every margin of the weakest view within its limit.
 
-    And those of every other view that is not stable: at the border it would be no better.
+    And those of every other view that is not stable: at the stability limit it would be no better.
     No other view of a loop goes beyond its limits, or further beyond them, and no requirement on a loop that
     is met is lost. ``None`` where no single gain within the factor `SPAN` does, or the view is no loop of
     `linear_figures`.

@@ -31,11 +31,13 @@ def section(result: Duty) -> doc.Section:
     if result.overload is None:
         note += " No overload state: the design states no limits.peak_time."
     table = doc.table("What the duty asks of the motor", _COLUMNS, _rows(result), note)
-    told = doc.severity(result.verdict)
-    told = "warn" if told == "info" and result.limited else told
+    severity = doc.severity(result.verdict)
+    severity = "warn" if severity == "info" and result.limited else severity
     own = requirements.table(result.requirements)
     blocks, words = [table, *own, _figure(result)], summary(result)
-    return doc.section("duty", "Duty cycle", blocks, result=words, intro=intro, status=told, told=told)
+    return doc.section(
+        "duty", "Duty cycle", blocks, result=words, intro=intro, status=severity, severity=severity
+    )
 
 
 RATED = {
@@ -76,9 +78,9 @@ def _found(result: Duty) -> str:
     """What is beyond its limit, else the current."""
     if beyond := [row for row in _rows(result) if row["_status"] == "fail"]:
         units = [f" {row['unit']}".rstrip() for row in beyond]
-        told = zip(beyond, units, strict=True)
+        shown = zip(beyond, units, strict=True)
         return "; ".join(
-            f"{r['what']} {r['value']:.4g}{unit}, limit {r['limit']:.4g}{unit}" for r, unit in told
+            f"{r['what']} {r['value']:.4g}{unit}, limit {r['limit']:.4g}{unit}" for r, unit in shown
         )
     known = math.isfinite(result.continuous_A)
     limit = f", limit {result.continuous_A:.4g} A" if known else ", and no continuous current is stated"
