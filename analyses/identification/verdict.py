@@ -191,13 +191,12 @@ def phase_items(design: Design, model: JointModel, records: Sequence[Record]) ->
 
     What a loop makes of a jump between the rows is then a share of the acceleration, as inertia is.
     """
-    sizes = {name: abs(one) / model.std(name) for name, one in model.bias.items() if model.std(name) > 0.0}
-    name = max(sizes, key=sizes.__getitem__, default="")
+    moved = {name: one / model[name] for name, one in model.bias.items() if abs(one) > SURE * model.std(name)}
+    shares = [f"{100.0 * one:.2g} % of {parameter(name, design.axis).label}" for name, one in moved.items()]
     rows = [record.name for record in records if one_phase(design, replace(record, between=""))]
-    if name and rows and sizes[name] > SURE:
-        share = f"{100.0 * model.bias[name] / model[name]:.2g} % of {parameter(name, design.axis).label}"
+    if shares and rows:
         told = f"all rows of {', '.join(rows)} are at one phase of the outer loop, taken to be its tick: "
-        told += f"{share} is taken off for that; log faster, or at another period"
+        told += f"{', '.join(shares)} is taken off for that; log faster, or at another period"
         yield Item.unproven("phase", "Rows at the outer loop's ticks", told)
 
 

@@ -170,9 +170,7 @@ def test_rows_at_the_ticks_of_the_position_loop_tell_the_inertia(gain, every, to
     design = with_values(_design(), {"control.position.every": 10, "control.position.gain": gain})
     result = identify_bench(design, [record if told else record.without({"reference"})])
     model = result.model
-    assert (
-        "% of Inertia, all at the motor is taken off" in item_of(result, "phase").reason
-    )  # as of another tick
+    assert "% of Inertia, all at the motor" in item_of(result, "phase").reason  # as of another tick
     assert errors_off(model, {"inertia": INERTIA}) < 3.5
     assert model["inertia"] == pytest.approx(INERTIA, rel=near)
     assert model.std("inertia") < near * INERTIA
