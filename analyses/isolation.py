@@ -11,7 +11,7 @@ from actuator_lti.errors import InputError, NumericalError, OutOfTime
 
 T = TypeVar("T")
 U = TypeVar("U")
-FORESEEN = NumericalError | OutOfTime
+EXPECTED = NumericalError | OutOfTime
 
 
 @dataclass(frozen=True)
@@ -20,7 +20,7 @@ class Missing:
 
     part: str  # in words
     why: str  # one line
-    traceback: str  # where it happened; empty for a numerical failure, which was foreseen
+    traceback: str  # where it happened; empty for a numerical failure, which was expected
 
 
 _noted: ContextVar[list[Missing] | None] = ContextVar("noted", default=None)
@@ -34,7 +34,7 @@ def isolated() -> Iterator[list[Missing]]:
     >>> with isolated() as missing:
     ...     attempt("a ratio", lambda: 1 / 0, None)
     >>> missing[0].part, missing[0].why
-    ('a ratio', 'unforeseen ZeroDivisionError: division by zero')
+    ('a ratio', 'unexpected ZeroDivisionError: division by zero')
     """
     outer, own = _noted.get(), list[Missing]()
     token = _noted.set(own)
@@ -84,10 +84,10 @@ def reason(error: BaseException) -> str:
     words = "".join(c if c.isprintable() else "?" for c in " ".join(str(error).split())[:400])
     if isinstance(error, OutOfTime):
         return words
-    kind = "numerical failure" if isinstance(error, FORESEEN) else f"unforeseen {type(error).__name__}"
-    return f"{kind}: {words}" if words or isinstance(error, FORESEEN) else kind
+    kind = "numerical failure" if isinstance(error, EXPECTED) else f"unexpected {type(error).__name__}"
+    return f"{kind}: {words}" if words or isinstance(error, EXPECTED) else kind
 
 
 def traceback_of(error: BaseException) -> str:
-    """Where it happened; empty for what was foreseen."""
-    return "" if isinstance(error, FORESEEN) else "".join(traceback.format_exception(error))
+    """Where it happened; empty for what was expected."""
+    return "" if isinstance(error, EXPECTED) else "".join(traceback.format_exception(error))

@@ -19,7 +19,7 @@ import numpy.typing as npt
 
 from actuator_lti.bounds import SIGNAL_ROWS, TONE_TICKS, TONES, Bound
 from actuator_lti.errors import InputError, finite_number, positive_number, shown, whole_number
-from actuator_lti.start.border import guard
+from actuator_lti.start.public_arguments import guard
 from actuator_lti.systems.root import root
 from actuator_lti.types import Floats, number_array
 from nonlinear._kernels import layout as at

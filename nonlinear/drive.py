@@ -10,7 +10,7 @@ import numpy as np
 
 from actuator_lti.design.loader import AnyDesign, as_design
 from actuator_lti.errors import InputError, NumericalError, finite_number, shown
-from actuator_lti.start.border import asked
+from actuator_lti.start.public_arguments import asked
 from actuator_lti.types import Floats
 from nonlinear._kernels import layout as at
 from nonlinear.commands import numbers_of
@@ -98,8 +98,8 @@ class Drive:
         """
         _check(command=command, load_Nm=load_Nm, torque_Nm=torque_Nm)
         self._io[at.IN_COMMAND] = command
-        if load_Nm or torque_Nm or self._p[at.RARE_LOAD]:
-            self._p[at.RARE_LOAD] = 1.0
+        if load_Nm or torque_Nm or self._p[at.HAS_CHANGING_LOAD]:
+            self._p[at.HAS_CHANGING_LOAD] = 1.0
             self._io[at.IN_LOAD], self._io[at.IN_TORQUE] = load_Nm, torque_Nm
         status = STATUS[self._tick()]
         if status != "ok":

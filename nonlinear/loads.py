@@ -9,15 +9,15 @@ from dataclasses import dataclass
 import numpy.typing as npt
 
 from actuator_lti.errors import finite_number
-from actuator_lti.start.border import asked, guard
+from actuator_lti.start.public_arguments import asked, guard
 from nonlinear.commands import Command, on_its_clock
 
-__all__ = ["LoadMoment", "constant", "proportional", "series"]
+__all__ = ["LoadTorque", "constant", "proportional", "series"]
 
 
 @asked
 @dataclass(frozen=True)
-class LoadMoment:
+class LoadTorque:
     """``M = constant + slope * output angle + series(t)`` in N m (N on a linear axis)."""
 
     constant_Nm: float = 0.0
@@ -29,22 +29,22 @@ class LoadMoment:
             finite_number(name, getattr(self, name))
 
 
-def constant(moment_Nm: float) -> LoadMoment:
+def constant(moment_Nm: float) -> LoadTorque:
     """The same moment all the time."""
-    return LoadMoment(constant_Nm=finite_number("load_Nm", moment_Nm))
+    return LoadTorque(constant_Nm=finite_number("load_Nm", moment_Nm))
 
 
-def proportional(slope_Nm_rad: float, offset_Nm: float = 0.0) -> LoadMoment:
+def proportional(slope_Nm_rad: float, offset_Nm: float = 0.0) -> LoadTorque:
     """Load torque ``offset + slope * output angle``; a negative slope pulls the canard back."""
-    return LoadMoment(constant_Nm=finite_number("offset_Nm", offset_Nm), slope_Nm_rad=slope_Nm_rad)
+    return LoadTorque(constant_Nm=finite_number("offset_Nm", offset_Nm), slope_Nm_rad=slope_Nm_rad)
 
 
-def series(time_s: npt.ArrayLike, moment_Nm: npt.ArrayLike, where: str = "load series") -> LoadMoment:
+def series(time_s: npt.ArrayLike, moment_Nm: npt.ArrayLike, where: str = "load series") -> LoadTorque:
     """Recorded or given moments, linear between their times, the last held; holes are refused.
 
     Times count from the beginning of the run: before the first of them there is no load.
     """
-    return LoadMoment(series=on_its_clock(time_s, moment_Nm, where=where))
+    return LoadTorque(series=on_its_clock(time_s, moment_Nm, where=where))
 
 
 guard(__name__)

@@ -237,16 +237,16 @@ def details(title: str, blocks: Sequence[Block]) -> Block:
 
 def section(
     id: str, title: str, blocks: Sequence[Block], *, result: str = "", intro: str = "",
-    status: Status = "info", told: Severity | None = None, findings: Iterable[Finding] = (),
+    status: Status = "info", severity: Severity | None = None, findings: Iterable[Finding] = (),
     verdict: Verdict | None = None,
 ) -> Section:  # fmt: skip
     """Make a section; ``id`` is its anchor.
 
-    ``result``: one sentence that says what was found, ``intro``: how. ``told``: how grave the result is,
+    ``result``: one sentence that says what was found, ``intro``: how. ``severity``: how grave the result is,
     where the first screen says it; ``findings``: what else that has to say. ``verdict`` counts beside
     the verdicts in it: where it is not proven, so is the document.
     """
-    first = [Finding(severity=told, text=result, where=id)] if told and result else []
+    first = [Finding(severity=severity, text=result, where=id)] if severity and result else []
     made: Section = {
         "id": id,
         "title": title,

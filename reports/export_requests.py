@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 from analyses.request import FORCE, Option
 
 CHECK = Option(
-    words="Measure the margins of the compiled code (sweep by injection, borders in time) and say so in the "
+    words="Measure the margins of the compiled code (sweep by injection, limits in time) and say so in the "
     "export; needs a C compiler.",
     flag="check/--no-check",
 )

@@ -17,7 +17,7 @@ from actuator_lti.files.atomic import write_bytes, write_together
 from analyses.linear.code_check import CodeCheck, check_code
 from nonlinear.export import PLATFORMS, c_export, controller_export, fmu_bytes, refuse_unknown
 from reports.cli.options import folder_for_results, refuse_existing
-from reports.cli.output import told_if_slow
+from reports.cli.output import note_if_slow
 from reports.export_requests import AskedC, AskedController, AskedFmu, AskedLinear
 from reports.html import environment, page
 from reports.linear_models import FORMS, SUFFIXES, linear_models, written_models
@@ -110,7 +110,7 @@ def _put(folder: Path, texts: Mapping[str, str], check: CodeCheck | None = None)
 
 
 def _checked(design: Design) -> CodeCheck:
-    with told_if_slow("measuring the margins of the compiled code (--no-check leaves it out)"):
+    with note_if_slow("measuring the margins of the compiled code (--no-check leaves it out)"):
         return check_code(design)
 
 

@@ -70,8 +70,8 @@ def _form(loops: Loops) -> Tree:
         command = _system(loops.plain_response, unit, f"{length}/s" if unit == "V" else unit)
         mean = command_mean(design)  # as states a chain of its samples
         responses["command"] = command | {"behind_mean_of_samples": mean.samples if mean else 1}
-    if loops.moment_system is not None:
-        responses["load"] = _system(loops.moment_system(), force, length)
+    if loops.load_torque_system is not None:
+        responses["load"] = _system(loops.load_torque_system(), force, length)
     return {
         "operating_point": loops.operating_point,
         "load": loops.load_Nm,

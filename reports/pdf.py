@@ -81,8 +81,10 @@ def summary(made: Mapping[str, Any]) -> Tree:
     kept = [part for part in made["sections"] if part["id"] in ("answer", "provenance")]
     rows = []
     for part in (one for one in made["sections"] if one not in kept):
-        told = part["status"] if part["status"] in ("fail", "warn") else ""  # green is said of verdicts only
-        rows.append({"part": part["title"], "found": part.get("result") or "", "_status": told})
+        status = (
+            part["status"] if part["status"] in ("fail", "warn") else ""
+        )  # green is said of verdicts only
+        rows.append({"part": part["title"], "found": part.get("result") or "", "_status": status})
     columns = [column("part", "Section"), column("found", "Found")]
     found = table("What each section of the whole report says", columns, rows)
     return {**made, "sections": [*kept[:1], section("found", "Section by section", [found]), *kept[1:]]}

@@ -2,7 +2,7 @@
 
 from actuator_lti.bandwidth.closed_loop import closed_loop_bandwidth, peaks
 from actuator_lti.bandwidth.results import Bandwidth, Level, Peaks
-from actuator_lti.start.border import guard
+from actuator_lti.start.public_arguments import guard
 
 __all__ = ["Bandwidth", "Level", "Peaks", "closed_loop_bandwidth", "peaks"]
 

@@ -75,7 +75,7 @@ def closed_loop_bandwidth(system: Any, delay_s: Delay = 0.0, level: Level = "1/s
     if seen is not exact:
         if exact.D[0] != 0 and abs(flint.fmpq(exact.N[0], exact.D[0])) < _TAKEN * abs(response.dc):
             raise InputError(_NO_GAIN)  # a mode seen at zero frequency alone takes the gain: a spring
-        if _told(given, response.dc):
+        if _is_resolved(given, response.dc):
             response = RationalResponse(exact.N, exact.D)
     if abs(response.lead) <= dc_noise(loop):
         raise InputError(_NO_GAIN)
@@ -85,7 +85,7 @@ def closed_loop_bandwidth(system: Any, delay_s: Delay = 0.0, level: Level = "1/s
     return _bandwidth(response, turn, level, loop.period_s)
 
 
-def _told(given: Given, dc: flint.fmpq) -> bool:
+def _is_resolved(given: Given, dc: flint.fmpq) -> bool:
     """Whether 8 ulp of the entries leave the gain at zero frequency what it is, apart from that given."""
     values, at = [], 0 if given.period_s is None else 1
     for num, den in map(exact_polynomials, (given, *given.neighbours())):

@@ -10,7 +10,7 @@ KERNELS = True
 LONGEST = 4_000_000  # ticks
 INSIDE = 9.0  # time constants of the slowest pole within the band: what is left is 1e-4 of it
 FORGOTTEN = 25.0  # time constants after which the second slowest pole leaves no digit (1e-11)
-ALIKE = 1e-9  # of its size: as slow as the slowest pole
+EQUAL = 1e-9  # of its size: as slow as the slowest pole
 
 
 def step_figures(n, a, b, c, lead, poles, row, state, after):
@@ -106,7 +106,7 @@ def _ticks_until_alone(n, poles, radius):
     second = 0.0
     for i in range(n):
         size = math.hypot(poles[2 * n + i], poles[3 * n + i])
-        if size < radius * (1.0 - ALIKE):
+        if size < radius * (1.0 - EQUAL):
             second = max(second, size)
     if second <= 0.0:
         return math.inf
@@ -149,7 +149,7 @@ def _turn(n, poles, radius):
 def _is_slowest(real, imaginary, radius):
     """Whether a pole is one of the slowest; that of an angle, which an inner loop does not see, is none."""
     size = math.hypot(real, imaginary)
-    return math.hypot(real - 1.0, imaginary) > HIDDEN and abs(size - radius) <= ALIKE * radius
+    return math.hypot(real - 1.0, imaginary) > HIDDEN and abs(size - radius) <= EQUAL * radius
 
 
 def _ticks_to(rest, level, radius):

@@ -18,7 +18,7 @@ from actuator_lti.drive.profile import command_mean
 from actuator_lti.drive.wiring import Drive, present, wire
 from actuator_lti.errors import InputError
 from actuator_lti.loops.periodic import fundamental, shown
-from actuator_lti.loops.sampled import answer, fundamental_path, stage_blocks
+from actuator_lti.loops.sampled import command_response, fundamental_path, stage_blocks
 from actuator_lti.loops.tick import Block, TickProgram
 
 _CHUNK = 256
@@ -122,7 +122,7 @@ def linear_figures(
     ``time_figures``: whether to follow the step responses as well (most of the time), or of which loops.
     ``held``: give an inner loop that its load, or what holds its torque over a tick, drives away by itself,
     in a drive that is stable as a whole, the figures of the same loop with the rotor held (current) or the
-    load moment held (velocity), if stable.
+    load torque held (velocity), if stable.
     ``threads``: that share the designs.
     ``loops``: those whose figures are wanted, by default all that the structure has.
 
@@ -138,7 +138,9 @@ def linear_figures(
 
     def fill(of: Collection[str], some: Population, numbers: np.ndarray) -> None:
         chunks = (
-            group[first : first + _CHUNK] for group in some.alike() for first in range(0, len(group), _CHUNK)
+            group[first : first + _CHUNK]
+            for group in some.same_structure()
+            for first in range(0, len(group), _CHUNK)
         )
 
         def one(chosen: np.ndarray) -> None:
@@ -170,7 +172,7 @@ def _hold(population: Population, at: Operating, loop: str, out: np.ndarray, tim
 
     def rows(chosen: np.ndarray, operating: Operating) -> np.ndarray:
         some, result = population.part(chosen), np.full((len(chosen), *out.shape[1:]), np.nan)
-        for group in some.alike():
+        for group in some.same_structure():
             _fill(wire(some.part(group).stacked, operating), group, timed, result, (loop,))
         return result[:, place]
 
@@ -226,7 +228,7 @@ def _command_path(wired: Drive, stage: str) -> tuple[Any, Block | None]:
     whose command has a mean it is that to the reference, behind mean and filter.
     """
     if stage != "position":
-        return 0.0, answer(wired, stage) if wired.answers_apart(stage) else None
+        return 0.0, command_response(wired, stage) if wired.responds_apart(stage) else None
     design, T = wired.design, wired.period_s("position")
     if command_mean(design.nominal or design):
         wired = wire(replace(design, command=Command()), wired.operating)

@@ -11,7 +11,7 @@ import numpy as np
 
 from actuator_lti.design.access import located, paths_of, stacked
 from actuator_lti.errors import InputError
-from actuator_lti.start.border import asked
+from actuator_lti.start.public_arguments import asked
 from actuator_lti.systems.sampling import split_delay
 
 if TYPE_CHECKING:
@@ -60,7 +60,7 @@ class Population:
         values = {path: np.asarray(array)[chosen] for path, array in self.values.items()}
         return Population(self.design, values, len(np.arange(self.count)[chosen]))
 
-    def alike(self) -> Iterator[np.ndarray]:
+    def same_structure(self) -> Iterator[np.ndarray]:
         """Numbers of designs with the same states: the same values are 0, as many ticks of delay."""
         control = self.stacked.controller
         whole, fraction = split_delay(control.computing_delay_s, control.period_s)

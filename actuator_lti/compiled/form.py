@@ -78,9 +78,9 @@ class Known(ast.NodeTransformer):
 
     def visit_Assign(self, node: ast.Assign) -> ast.stmt | list[ast.stmt] | None:
         self.generic_visit(node)
-        return None if len(node.targets) == 1 and self.told(node.targets[0], node.value) else node
+        return None if len(node.targets) == 1 and self.is_followed(node.targets[0], node.value) else node
 
-    def told(self, target: ast.expr, value: ast.expr) -> bool:
+    def is_followed(self, target: ast.expr, value: ast.expr) -> bool:
         """Note a variable that is assigned here alone, and known."""
         if not (isinstance(target, ast.Name) and target.id in self.once and isinstance(value, ast.Constant)):
             return False

@@ -91,8 +91,8 @@ class _Body(Known):
         target, value = node.targets[0], self.visit(node.value)
         if isinstance(target, ast.Tuple) and isinstance(value, ast.Tuple) and not overlap(target, value):
             pairs = zip(target.elts, value.elts, strict=True)
-            return [ast.Assign([self.visit(t)], v, lineno=0) for t, v in pairs if not self.told(t, v)]
-        if len(node.targets) == 1 and self.told(target, value):
+            return [ast.Assign([self.visit(t)], v, lineno=0) for t, v in pairs if not self.is_followed(t, v)]
+        if len(node.targets) == 1 and self.is_followed(target, value):
             return []
         return [ast.Assign([self.visit(each) for each in node.targets], value, lineno=0)]
 

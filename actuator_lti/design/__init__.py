@@ -17,7 +17,7 @@ from actuator_lti.design.plant import no_load_speed
 from actuator_lti.design.suspicions import warnings_of
 from actuator_lti.design.tolerances import tolerances
 from actuator_lti.design.writing import design_hash, design_tree, with_overrides, write_design
-from actuator_lti.start.border import guard
+from actuator_lti.start.public_arguments import guard
 
 __all__ = [
     "FIELDS", "QUANTITIES", "Design", "SweepPoint", "as_design", "check_design", "design_hash", "design_tree",

@@ -12,7 +12,7 @@ from actuator_lti.design.checks_control import CONTROL_CHECKS
 from actuator_lti.design.checks_plant import FIRST_RELATIONS, PLANT_CHECKS, with_stand_ins
 from actuator_lti.design.field import Field, Structure
 from actuator_lti.design.fields import FIELDS, TABLES, at_place, fields_in, part_at, parts_of, template_of
-from actuator_lti.design.mistakes import UNREAD, Check, Findings, Refusal, UnreadError, readable, told
+from actuator_lti.design.mistakes import UNREAD, Check, Findings, Refusal, UnreadError, printed, readable
 from actuator_lti.design.model import Correlation, Design, Requirement
 from actuator_lti.files.reading import shown
 
@@ -143,20 +143,20 @@ def _of_loop(design: Design, path: str, item: Requirement) -> Iterator[Refusal]:
         given = "missing" if item.loop is None else shown(item.loop)
         yield f"{path}.loop", given, f"allowed: {', '.join(sorted(present))}"
     elif not of_loop and item.loop is not None:
-        yield f"{path}.loop", told(item.loop), f"{item.quantity} is of the drive, no loop"
+        yield f"{path}.loop", printed(item.loop), f"{item.quantity} is of the drive, no loop"
 
 
 def _of_rotor(design: Design, path: str, item: Requirement) -> Iterator[Refusal]:
     there = "current" in design.controller.stages
     if item.rotor is not None and not (there and item.loop in ("current", "every")):
-        yield f"{path}.rotor", told(item.rotor), "allowed: of the current loop only"
+        yield f"{path}.rotor", printed(item.rotor), "allowed: of the current loop only"
 
 
 def _of_response(design: Design, path: str, item: Requirement) -> Iterator[Refusal]:
     there = "position" in design.controller.stages and item.loop in ("position", "every")
     if item.to is not None and not (there and QUANTITIES[item.quantity].of_response):
         allowed = "allowed: of bandwidth, resonance and step of the position loop only"
-        yield f"{path}.to", told(item.to), allowed
+        yield f"{path}.to", printed(item.to), allowed
 
 
 def _waivers(design: Design) -> Iterator[Refusal]:

@@ -7,7 +7,7 @@ from math import inf, isclose, log
 from typing import Any
 
 from actuator_lti.design.fields import FIELDS, axis_unit, part_at
-from actuator_lti.design.mistakes import UNREAD, Check, Refusal, Rule, readable, told
+from actuator_lti.design.mistakes import UNREAD, Check, Refusal, Rule, printed, readable
 from actuator_lti.design.model import Design
 from actuator_lti.design.plant import MotorConstants
 from actuator_lti.design.spellings import split_quantity
@@ -190,7 +190,7 @@ def _no_gear(design: Design, path: str, attribute: str) -> Iterator[Refusal]:
     name, names = getattr(part_at(design, path), attribute, None), [gear.name for gear in design.gears]
     if name is not None and name not in names:
         known = ", ".join(names) or "none, as there are no gears; leave it out"
-        yield f"{path}.{attribute}", told(name), f"is no gear; allowed: {known}"
+        yield f"{path}.{attribute}", printed(name), f"is no gear; allowed: {known}"
 
 
 def _locking(design: Design) -> Iterator[Refusal]:

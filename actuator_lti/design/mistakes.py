@@ -35,7 +35,7 @@ def refusal_text(refusal: Refusal) -> str:
     return f"{shown(path, 200)[1:-1]}{f' = {value}' if value else ''}: {reason}"
 
 
-def told(value: object) -> str:
+def printed(value: object) -> str:
     """A value as `Refusal` has it: quoted and short, nothing of one that could not be read."""
     return "" if value is UNREAD else shown(value)
 
@@ -128,9 +128,9 @@ class Findings:
         return self.lines.get(path, 0)
 
 
-def meant_of(word: str, known: Iterable[str], alike: float = 0.65) -> str:
+def meant_of(word: str, known: Iterable[str], similarity: float = 0.65) -> str:
     every = list(known)
-    return word if word in every else next(iter(get_close_matches(word, every, 1, alike)), "")
+    return word if word in every else next(iter(get_close_matches(word, every, 1, similarity)), "")
 
 
 def nearest(word: str, known: Iterable[str]) -> str:

@@ -59,7 +59,7 @@ from actuator_lti.design.plant import (
     Temperature,
 )
 from actuator_lti.drawing import draw
-from actuator_lti.start.border import checks_arguments
+from actuator_lti.start.public_arguments import checks_arguments
 
 
 @dataclass(frozen=True, kw_only=True)

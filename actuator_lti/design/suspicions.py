@@ -198,8 +198,8 @@ def _asked_for(design: Design) -> Iterator[str]:
         drives = "at angle 0 the mass stands upright, and gravity drives it away; 180 deg: it hangs"
         yield f"load.gravity.offset: not given, 0 assumed: {drives}"
     for one in design.requirements:
-        if one.minimum is not None and (told := beyond_profile(design, one, one.minimum)):
-            yield f"requirement {one.id}: at least {one.minimum:.4g} {one.unit}, but {told}"
+        if one.minimum is not None and (reason := beyond_profile(design, one, one.minimum)):
+            yield f"requirement {one.id}: at least {one.minimum:.4g} {one.unit}, but {reason}"
 
 
 def beyond_profile(design: Design, requirement: Requirement, value: float) -> str:

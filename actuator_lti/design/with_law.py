@@ -134,6 +134,6 @@ def _sampled(parts: tuple[Any, ...], dt: Any, period_s: float, method: str) -> t
             warnings.simplefilter("error", LinAlgWarning)  # singular to rounding
             A, B, C, D = cont2discrete(scaled, period_s, METHODS[method])[:4]
     except (LinAlgError, LinAlgWarning) as error:
-        told = f"a pole at 2/T = {2.0 / period_s:g} 1/s, where Tustin's form is infinite"
-        raise InputError(f"system: {told}; allowed: none there, or method = zoh") from error
+        reason = f"a pole at 2/T = {2.0 / period_s:g} 1/s, where Tustin's form is infinite"
+        raise InputError(f"system: {reason}; allowed: none there, or method = zoh") from error
     return A / t * t[:, None], B * t[:, None], C / t, D

@@ -21,8 +21,8 @@ from actuator_lti.margins import stability_margins
 from actuator_lti.margins.given import given_of
 from actuator_lti.margins.measured.margins import measured_points
 from actuator_lti.measured.response import is_measured, measured_response, refuse_measured
-from actuator_lti.start.border import guard
 from actuator_lti.start.extras import need
+from actuator_lti.start.public_arguments import guard
 from actuator_lti.systems.phase import unwrapped_phase_deg
 from actuator_lti.systems.resolvent import apart_about_minus_one, refined
 

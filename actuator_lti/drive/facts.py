@@ -60,7 +60,7 @@ def resonance_rad_s(design: Design, load_Nm: float = 0.0) -> Any:
 
 
 def passed_moment_Nm(design: Design, load_Nm: float) -> Any:
-    """Torque at the motor by a moment on the output shaft; 0 where the load path locks itself."""
+    """Torque at the motor by a load torque on the output shaft; 0 where the load path locks itself."""
     return load_Nm / design.total_ratio if design.load.path == "back-drivable" else 0.0
 
 
@@ -215,7 +215,7 @@ def capability(design: Design, load_Nm: float = 0.0) -> Capability:
     """Rate, current and acceleration at a load torque (either sign): the worse of both directions.
 
     Worse is the slower direction, then the weaker, then the one that needs more current. On a back-drivable
-    path the moment, with the load's own at output angle 0 (gravity), is against the motion.
+    path the load torque, with the load's own at output angle 0 (gravity), is against the motion.
 
     Raises `InputError`: if the load is not finite.
     """

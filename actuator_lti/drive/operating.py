@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from actuator_lti.errors import InputError, finite_number
-from actuator_lti.start.border import asked
+from actuator_lti.start.public_arguments import asked
 
 if TYPE_CHECKING:
     from actuator_lti.design.model import Design, FrictionPoint
@@ -156,7 +156,7 @@ def holding_moment_Nm(design: Design, angle_rad: float = 0.0) -> float:
 
 
 def carried_Nm(design: Design, at: Operating) -> Any:
-    """Torque of the coupling under a load and the load's own moment at the output angle, no friction."""
+    """Torque of the coupling under a load and the load's own torque at the output angle, no friction."""
     own = design.load.over_angle.at(at.angle_rad, moving=_moving(design, at))
     return -(at.load_Nm + own) / design.ratio_behind_coupling
 

@@ -32,12 +32,12 @@ class Plant:
     # i, w, th in A, rad/s, rad at the motor (a torque source has no i, a locked rotor i alone); behind a
     # coupling W and twist = th/N_c - phi at its own shaft: one absolute angle, which no inner loop sees
     states: tuple[str, ...]
-    A: np.ndarray  # shape (..., n, n): without the load's own torques, see `moment`
+    A: np.ndarray  # shape (..., n, n): without the load's own torques, see `load_torque`
     B_u: np.ndarray  # shape (..., n): of the voltage in V, or the drive signal of a torque source
     B_T: np.ndarray  # of a torque in N m that accelerates the motor
-    B_M: np.ndarray  # of a moment in N m that pushes the output shaft forward
+    B_M: np.ndarray  # of a load torque in N m that pushes the output shaft forward
     torque: Entries  # the motor's own, of states and rows, held over a tick; empty where there is none
-    moment: Entries  # the load's own on the output shaft, in the same way
+    load_torque: Entries  # the load's own on the output shaft, in the same way
     rows: dict[str, Entries]  # angles, speeds and T_s of states; load_speed: the motor's that its sensor sees
 
 
@@ -90,12 +90,12 @@ def motor_plant(design: Design, at: Operating | None = None) -> Plant:
 def _at_once(plant: Plant) -> Plant:
     """The same with its own torques in A, not held."""
     A, unit = plant.A, np.eye(len(plant.states))
-    for own, B in ((plant.torque, plant.B_T), (plant.moment, plant.B_M)):
+    for own, B in ((plant.torque, plant.B_T), (plant.load_torque, plant.B_M)):
         for name, gain in own.items():
             for state, share in plant.rows.get(name, {name: 1.0}).items():
                 made = B * np.asarray(gain * share)[..., None]
                 A = A + made[..., None] * unit[plant.states.index(state)]
-    return replace(plant, A=A, torque={}, moment={})
+    return replace(plant, A=A, torque={}, load_torque={})
 
 
 def _electrical(motor: Motor) -> tuple[MatrixEntries, Entries]:
@@ -123,7 +123,7 @@ def _rigid(design: Design, motor: Motor, at: Operating) -> Plant:
     return Plant(
         states=names, A=matrix(names, A), B_u=vector(names, B_u), B_T=vector(names, {"w": 1 / J}),
         B_M=vector(names, {"w": 1 / (N * J) if reaches else 0.0}), torque=_own_torque(design, at),
-        moment=_own_moment(design, at) if reaches else {},
+        load_torque=_own_load_torque(design, at) if reaches else {},
         rows={"output_angle": {"th": 1 / N}, "output_speed": {"w": 1 / N}, "load_speed": {"w": 1.0}}
     )  # fmt: skip
 
@@ -134,7 +134,7 @@ def _own_torque(design: Design, at: Operating) -> Entries:
     return {"th": slope} if np.any(slope != 0) else {}
 
 
-def _own_moment(design: Design, at: Operating) -> Entries:
+def _own_load_torque(design: Design, at: Operating) -> Entries:
     damping = design.load.moment_damping_Nms_rad / design.total_ratio
     gains = {"output_angle": moment_slope(design, at), "load_speed": -damping}
     return {row: gain for row, gain in gains.items() if np.any(gain != 0)}
@@ -163,7 +163,7 @@ def _elastic(design: Design, motor: Motor, at: Operating) -> Plant:
         B_T=vector(names, {"w": 1 / J_m}),
         B_M=vector(names, {"W": 1 / (N_r * J_l)}),
         torque=_own_torque(design, at),
-        moment=_own_moment(design, at),
+        load_torque=_own_load_torque(design, at),
         rows={
             "output_angle": {name: value / N_r for name, value in phi.items()},
             "phi": phi,

@@ -33,7 +33,7 @@ _SIGNALS = (
     Signal("W", "speed behind the coupling", "rad/s", "m/s"),
     Signal("T_s", "coupling torque", "N m", "N"),
     Signal("output", "output angle", "rad", "m"),
-    Signal("moment", "load torque on the output shaft", "N m", "N"),
+    Signal("load_torque", "load torque on the output shaft", "N m", "N"),
     Signal("w_cmd", "speed command before its limits", "rad/s", "m/s"),
     Signal("torque_command", "velocity controller's output", "A"),
     Signal("w_meas", "measured speed", "rad/s", "m/s"),

@@ -42,7 +42,7 @@ class Drive:
     stages: tuple[str, ...]  # those present, innermost first, of "current", "velocity", "position"
     interval: dict[str, int]  # ticks between two updates of each, and of the speed measurement ("speed")
     target: dict[str, str]  # the signal that each stage drives: "u", "i_ref" or "w_ref"
-    # Loops cut at a break point, how far they are from their border, kept by `actuator_lti.loops.periodic`
+    # Loops cut at a break point and their distances to the stability limit, by `actuator_lti.loops.periodic`
     blocks_at: dict[str, Any] = field(default_factory=dict, init=False, repr=False, compare=False)
     margins_at: dict[Any, Any] = field(default_factory=dict, init=False, repr=False, compare=False)
 
@@ -52,7 +52,7 @@ class Drive:
 
     @cached_property
     def hold(self) -> DelayedHold:
-        """The sampled plant; the angle is an exact integrator. Second inputs: torque at the motor, moment."""
+        """The sampled plant; the angle is an exact integrator. Second inputs: motor and load torque."""
         plant, control = self.plant, self.design.controller
         B = np.stack(np.broadcast_arrays(plant.B_T, plant.B_M), axis=-1)
         hold = delayed_hold(plant.A, plant.B_u[..., None], B, control.period_s, control.computing_delay_s)
@@ -73,7 +73,7 @@ class Drive:
         own = self.design.controller.own_law
         return own is not None and own[0] == stage and stage in self.stages
 
-    def answers_apart(self, stage: str) -> bool:
+    def responds_apart(self, stage: str) -> bool:
         """Whether L/(1 + L) need not be how an inner stage answers its command: its law may take more."""
         return stage != "position" and self.has_own_law(stage)
 

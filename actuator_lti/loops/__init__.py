@@ -6,7 +6,7 @@ Light to import; python-control is loaded when loops are assembled.
 from actuator_lti.loops.assemble import assemble_loops
 from actuator_lti.loops.periodic import ExactMargins, PeriodicLoop, exact_margins, periodic_loop
 from actuator_lti.loops.result import Form, InnerLoops, Loop, Loops
-from actuator_lti.start.border import guard
+from actuator_lti.start.public_arguments import guard
 
 __all__ = [
     "ExactMargins", "Form", "InnerLoops", "Loop", "Loops", "PeriodicLoop", "assemble_loops", "exact_margins",

@@ -80,7 +80,7 @@ def loops_at(
         break_points={point: time.loop(wired, point, *more) for point in wired.points},
         limiters=time.limiters(wired, *more) if whole else {},
         plain_response=time.reference_to_output(wired, *more) if whole else None,
-        moment_system=partial(time.moment_to_output, wired, *more) if whole else None,
+        load_torque_system=partial(time.load_torque_to_output, wired, *more) if whole else None,
         tick_system=time.tick_system(wired) if whole and sampled_form else None,
         period_s=wired.tick_s if sampled_form else None
     )  # fmt: skip

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from actuator_lti.systems.delay_system import DelaySystem
 
 PlantInput = Literal["u", "i_ref"]
-INPUTS = ("ref", "moment")  # behind ``command`` and ``load_torque``
+INPUTS = ("ref", "load_torque")  # behind ``command`` and ``load_torque``
 OUTPUTS = {"current": "i", "speed": "w", "angle": "th", "output_angle": "output_angle", "twist": "twist",
            "output_speed": "output_speed"}  # fmt: skip
 

@@ -92,13 +92,18 @@ def finished(system: PlainDelaySystem, name: str, source: str, signal: str) -> A
 
 
 def open_loop(
-    wired: Drive, place: str, delays: frozenset[str], opened: tuple[str, ...] = (), *, answer: bool = False
+    wired: Drive,
+    place: str,
+    delays: frozenset[str],
+    opened: tuple[str, ...] = (),
+    *,
+    command_response: bool = False,
 ) -> PlainDelaySystem:
     """The open loop of a stage at its own error, inner loops closed (unless opened), outer ones absent.
 
     Or that at a break point with all other loops closed; or how the stage answers its command.
     """
-    cut, signal, scale = wired.command_of(place) if answer else wired.cut_of(place)
+    cut, signal, scale = wired.command_of(place) if command_response else wired.cut_of(place)
     outer = place if place in wired.stages else wired.outermost
     return joined(systems(FlowProgram(wired, outer, cut, opened, delays).flow(), "cut", signal, scale))
 
@@ -107,8 +112,8 @@ def loop(wired: Drive, place: str, delays: frozenset[str], opened: tuple[str, ..
     """The same with its closed loop and its sensitivity."""
     system = open_loop(wired, place, delays, opened)
     parts, own = (system, system.feedback(), static(np.eye(1)).feedback(system)), None
-    if wired.answers_apart(place):
-        own = open_loop(wired, place, delays, opened, answer=True)
+    if wired.responds_apart(place):
+        own = open_loop(wired, place, delays, opened, command_response=True)
     return loop_of(wired, place, parts, own, finished)
 
 
@@ -123,10 +128,10 @@ def reference_to_output(wired: Drive, delays: frozenset[str]) -> Any:
     return finished(total, "reference_to_output", source, label)
 
 
-def moment_to_output(wired: Drive, delays: frozenset[str]) -> Any:
+def load_torque_to_output(wired: Drive, delays: frozenset[str]) -> Any:
     """Moment on the output shaft to the output angle, all loops closed."""
-    system = delay_system(_whole(wired, delays), "moment", "output_angle")
-    return finished(system, "moment_to_output", "moment", "output_angle")
+    system = delay_system(_whole(wired, delays), "load_torque", "output_angle")
+    return finished(system, "load_torque_to_output", "load_torque", "output_angle")
 
 
 def limiters(wired: Drive, delays: frozenset[str]) -> dict[str, LimiterPath]:

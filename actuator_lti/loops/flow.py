@@ -9,8 +9,8 @@ filter is the lag 1/(T_F s + 1). A derivative that the controller takes is the d
 delay kept exactly; in the ideal form it is the derivative.
 
 What remains between this form and the sampled one is of order Ts: the digital PI is
-Kp (1 + 1/(Tn s)) + Kp T/(2 Tn) + O(s T^2), the tracking loop leads by T/2, a moment that follows the output
-is held, and holds and differences also lose some gain.
+Kp (1 + 1/(Tn s)) + Kp T/(2 Tn) + O(s T^2), the tracking loop leads by T/2, a load torque that follows the
+output is held, and holds and differences also lose some gain.
 """
 
 from dataclasses import dataclass
@@ -68,9 +68,9 @@ class FlowWalk(Walk):
             self.rate[name] = total(own)
         u = self.controllers()
         self.signals.setdefault("u", u)
-        torque, moment = self.acting()
+        torque, load_torque = self.acting()
         for r, name in enumerate(plant.states):
-            acting = ((plant.B_u, u), (plant.B_T, torque), (plant.B_M, moment))
+            acting = ((plant.B_u, u), (plant.B_T, torque), (plant.B_M, load_torque))
             self.rate[name] += total(float(B[r]) * row for B, row in acting)
 
     def state(self, name: str) -> Row:

@@ -6,7 +6,7 @@ frequency and at M - 1 images.  A frequency-response analyser sees the fundament
 S + T = 1, and L = y/e = T/S.  These three are what `fundamental` returns, exactly, as ordinary sampled
 systems.  Their closed-loop poles are the M-th roots of the eigenvalues of the true loop over one period, so
 the verdict on stability from them is the truth.  A margin read from L is that of the fundamental only;
-`exact_margins` gives the gains and the delay that bring the true loop to its border.
+`exact_margins` gives the gains and the delay that bring the true loop to its stability limit.
 """
 
 from collections.abc import Callable, Sequence
@@ -88,7 +88,7 @@ def shown(blocks: Sequence[Block]) -> list[Block]:
 
 @dataclass(frozen=True)
 class ExactMargins:
-    """Borders of stability of a sampled loop from the eigenvalues over one whole period."""
+    """Stability limits of a sampled loop from the eigenvalues over one whole period."""
 
     stable: bool
     # Factor on the loop gain at the break point that first brings an eigenvalue to the unit circle, going up
@@ -202,7 +202,7 @@ def _split(blocks: Sequence[Block]) -> tuple[list[System], list[System]]:
     return moved, [(a, np.zeros_like(b), np.zeros_like(c)) for a, b, c in others]
 
 
-def first_border(excess: Callable[[Any], Any], grid: np.ndarray, none: float, at_once: int = 1) -> float:
+def first_limit(excess: Callable[[Any], Any], grid: np.ndarray, none: float, at_once: int = 1) -> float:
     """First root of ``excess`` (negative at grid[0]) along a grid, so many of its values asked at once."""
     found = np.atleast_1d(excess(grid[0]))
     for start in range(1, len(grid), at_once):
@@ -238,7 +238,7 @@ def _top(excess: Callable[[Any], Any], low: float, high: float) -> float:
 def exact_margins(loops: Loops, point: str, longest_delay_ticks: float = 50.0) -> ExactMargins:
     """Gain and delay margins of a sampled loop at a break point, periodic or not, by eigenvalues.
 
-    Found by stepping outwards (1.0233 in gain, a quarter tick in delay) to the first border, or to what peaks
+    Found by stepping outwards (1.0233 in gain, a quarter tick in delay) to the first limit, or to what peaks
     between two steps near it, and polishing it.
 
     Raises `InputError`: if the loops are not sampled, or have no such break point.
@@ -259,13 +259,13 @@ def _margins_of(wired: Drive, point: str, longest_delay_ticks: float) -> ExactMa
     nan = float("nan")
     if radius >= 1:
         return ExactMargins(False, nan, nan, nan if point == "u" else None, radius)
-    upper = first_border(lambda g: moved.radius(g) - 1, GAINS, float("inf"), _AT_ONCE)
-    lower = first_border(lambda g: moved.radius(g) - 1, 1 / GAINS, 0.0, _AT_ONCE)
-    delay = _delay_border(wired, longest_delay_ticks, moved) if point == "u" else None
+    upper = first_limit(lambda g: moved.radius(g) - 1, GAINS, float("inf"), _AT_ONCE)
+    lower = first_limit(lambda g: moved.radius(g) - 1, 1 / GAINS, 0.0, _AT_ONCE)
+    delay = _delay_limit(wired, longest_delay_ticks, moved) if point == "u" else None
     return ExactMargins(True, upper, lower, delay, radius)
 
 
-def _delay_border(wired: Drive, longest_ticks: float, now: PeriodicLoop) -> float:
+def _delay_limit(wired: Drive, longest_ticks: float, now: PeriodicLoop) -> float:
     """The first computing delay at which a mode comes to the unit circle; whole updates are a queue."""
     Ts, every = wired.tick_s, wired.interval[wired.producer("u")]
     resting = _states(_split(point_blocks(wired, "u"))[0]) - _states(now.systems)  # whatever the delay
@@ -284,7 +284,7 @@ def _delay_border(wired: Drive, longest_ticks: float, now: PeriodicLoop) -> floa
 
     step = 1 / _DELAY_STEPS_A_TICK
     grid = np.array([0.0, *np.arange(step, longest_ticks, step)])
-    return first_border(excess, grid, float("inf")) * Ts
+    return first_limit(excess, grid, float("inf")) * Ts
 
 
 def _states(systems: Sequence[System]) -> int:

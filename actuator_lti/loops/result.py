@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from actuator_lti.drawing import draw
 from actuator_lti.errors import InputError
-from actuator_lti.start.border import checks_arguments
+from actuator_lti.start.public_arguments import checks_arguments
 from actuator_lti.systems.as_control import as_control
 
 Form = Literal["sampled", "continuous", "ideal"]
@@ -43,8 +43,8 @@ class Loop:
     T are the fundamental responses of the exact loop and L = T/S, see `actuator_lti.loops.periodic`.
     ``rotor``: "free" or "locked"; with a locked one there is a current loop alone.
     ``at_law``: whether it is the loop of a stage, cut at what a law of one's own gives.
-    ``plain_answer``: of an inner stage with such a law its response from its command to what it measures:
-    L/(1 + L) tells it only where the law takes nothing but the error; else None.
+    ``plain_command_response``: of an inner stage with such a law its response from command to measured value:
+    L/(1 + L) only where the law takes nothing but the error; else None.
     """
 
     name: str
@@ -58,7 +58,7 @@ class Loop:
     periodic: bool = False
     rotor: RotorState = "free"
     at_law: bool = False
-    plain_answer: Any = None
+    plain_command_response: Any = None
 
     @cached_property
     def open_loop(self) -> Any:
@@ -110,10 +110,10 @@ class Loop:
 
 
 def loop_of(
-    wired: Drive, place: str, parts: tuple[Any, Any, Any], answer: Any,
+    wired: Drive, place: str, parts: tuple[Any, Any, Any], own: Any,
     named: Callable[[Any, str, str, str], Any], period_s: float | None = None, *, periodic: bool = False,
 ) -> Loop:  # fmt: skip
-    """The loop of a stage, or at a break point, of L, T, S and what may answer its command, by ``named``."""
+    """The loop of a stage, or at a break point, of L, T, S and an ``own`` response to its command."""
     error, measured = wired.around(place)
     name = place if place in wired.stages else f"at {place}"
     label, unit = name.replace(" ", "_"), wired.unit(error)
@@ -124,7 +124,9 @@ def loop_of(
         plain_sensitivity=named(parts[2], f"{label}_sensitivity", "reference", error), period_s=period_s,
         unit_in=unit, unit_out=unit, periodic=periodic, rotor=wired.operating.rotor,
         at_law=wired.has_own_law(place),
-        plain_answer=None if answer is None else named(answer, f"{label}_answer", "command", place),
+        plain_command_response=(
+            None if own is None else named(own, f"{label}_command_response", "command", place)
+        ),
     )  # fmt: skip
 
 
@@ -139,8 +141,8 @@ class Loops:
     from the angle stays closed.
     ``limiters``: a `LimiterPath` from the command to what each limiter sees, by the names of
     `actuator_lti.drive.signals.LIMITERS`, as far as they exist.
-    ``plain_response``, ``moment_system``: what `reference_to_output` is made of when it is first asked for
-    (as of a `Loop`), and what makes `moment_to_output`.
+    ``plain_response``, ``load_torque_system``: what `reference_to_output` is made of when it is first asked
+    for (as of a `Loop`), and what makes `load_torque_to_output`.
     ``tick_system``: the whole sampled closed loop, tick by tick (form "sampled").
     ``period_s``: base period Ts; None where not sampled.
     """
@@ -155,7 +157,7 @@ class Loops:
     break_points: Mapping[str, Loop]
     limiters: Mapping[str, LimiterPath]
     plain_response: Any | None
-    moment_system: Callable[[], Any] | None
+    load_torque_system: Callable[[], Any] | None
     tick_system: TickSystem | None
     period_s: float | None
 
@@ -170,14 +172,14 @@ class Loops:
         return as_control(self.plain_response)
 
     @cached_property
-    def moment_to_output(self) -> Any | None:
+    def load_torque_to_output(self) -> Any | None:
         """Moment on the output shaft, held over every tick, to the output angle, all loops closed.
 
         The compliance, as a python-control system; its inverse is the dynamic stiffness. It is made when it
         is first asked for: with slow outer stages it has hundreds of states
         (`actuator_lti.loops.stiffness` has the same response with few). None with the rotor locked.
         """
-        return None if self.moment_system is None else as_control(self.moment_system())
+        return None if self.load_torque_system is None else as_control(self.load_torque_system())
 
     @property
     def operating_point(self) -> str:

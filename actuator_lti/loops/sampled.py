@@ -34,7 +34,7 @@ def loop(wired: Drive, place: str, opened: tuple[str, ...] = ()) -> Loop:
     block = fundamental(shown(blocks)).shown()
     period = wired.period_s(place if is_stage else wired.producer(place))
     parts, named = (block, block.feedback(), block.sensitivity()), partial(_system, period_s=period)
-    own = answer(wired, place, opened).shown() if wired.answers_apart(place) else None
+    own = command_response(wired, place, opened).shown() if wired.responds_apart(place) else None
     return loop_of(wired, place, parts, own, named, period, periodic=len(blocks) > 1)
 
 
@@ -45,7 +45,7 @@ def reference_to_output(wired: Drive) -> PlainSystem:
     return _system(block.shown(), "reference_to_output", source, label, every * wired.tick_s)
 
 
-def answer(wired: Drive, stage: str, opened: tuple[str, ...] = ()) -> Block:
+def command_response(wired: Drive, stage: str, opened: tuple[str, ...] = ()) -> Block:
     """Command of a stage behind its filter to what it measures, as `stage_blocks` has the other loops."""
     cut, signal, _ = wired.command_of(stage)
     return fundamental_path(TickProgram(wired, stage, cut, opened), wired.interval[stage], "cut", signal)
@@ -66,15 +66,15 @@ def whole_path(wired: Drive) -> tuple[str, str, int, str]:
     return COMMANDS[stage], signal, wired.interval.get(stage, 1), label
 
 
-def moment_to_output(wired: Drive) -> PlainSystem:
+def load_torque_to_output(wired: Drive) -> PlainSystem:
     """Moment on the output shaft, held over every tick, to the output angle: the compliance, all loops
     closed.
 
     Its inverse is the dynamic stiffness (model.md section 9). Where the drive has slower stages, the
     fundamental of the periodic loop.
     """
-    block = fundamental_path(TickProgram(wired, wired.outermost), 1, "moment", "output_angle")
-    return _system(block, "moment_to_output", "moment", "output_angle", wired.tick_s)
+    block = fundamental_path(TickProgram(wired, wired.outermost), 1, "load_torque", "output_angle")
+    return _system(block, "load_torque_to_output", "load_torque", "output_angle", wired.tick_s)
 
 
 def tick_system(wired: Drive) -> TickSystem:

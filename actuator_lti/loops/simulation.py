@@ -25,9 +25,9 @@ class TickSystem:
     """``x_{k+1} = A_j x_k + B_j v_k, y_k = C_j x_k + D_j v_k``, v = [ref, T, M], j = k mod `ticks`.
 
     ref is the command at t_k: of the position at the output shaft (rad), else ``w_ref`` (rad/s at the motor),
-    ``i_ref`` (A) or ``u`` (V); T a torque in N m at the motor shaft that accelerates it, M a moment in N m
-    that pushes the output shaft forward, both held over the tick (dry friction while w > 0: T = -Tc; of the
-    load while W > 0: M = -N_r C0_l).  With the feed-forward the command before t_0 counts as 0 unless
+    ``i_ref`` (A) or ``u`` (V); T a torque in N m at the motor shaft that accelerates it, M a load torque
+    in N m that pushes the output shaft forward, both held over the tick (dry friction while w > 0: T = -Tc;
+    of the load while W > 0: M = -N_r C0_l).  With the feed-forward the command before t_0 counts as 0 unless
     `initial_state` says otherwise (``ref_prev``, motor side).
     """
 
@@ -74,7 +74,7 @@ class TickSystem:
         """Run the recursion from t_0, see `initial_state`; gives `outputs` at t_k, each of shape (K,).
 
         The command is that at t_k in its own unit (read only where the outermost loop updates), the torque
-        accelerates the motor shaft, the moment pushes the output shaft forward; each of shape (K,), or one.
+        accelerates the motor shaft, the load torque pushes the output shaft forward; shape (K,), or one.
         """
         reference = np.asarray(reference_rad, dtype=float)
         given = (torque_Nm, moment_Nm)
@@ -106,7 +106,7 @@ class TickSystem:
             labels += [f"{name}[{j}]" if self.ticks > 1 else name for name in self.outputs]
         return control.ss(
             A, B, np.vstack(C), np.vstack(D), self.ticks * self.program.drive.tick_s,
-            inputs=[COMMANDS[self.program.outer], "torque", "moment"],
+            inputs=[COMMANDS[self.program.outer], "torque", "load_torque"],
             outputs=labels,
             states=[name.replace(".", "_") for name in self.states],
         )  # fmt: skip

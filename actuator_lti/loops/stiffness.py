@@ -27,8 +27,8 @@ if TYPE_CHECKING:
 
 POINTS = 240
 LOWEST_HZ, HIGHEST_HZ = 0.1, 1000.0
-BELOW_NYQUIST = 0.45  # of the sampling rate: at 0.5 a held moment does not move a free mass at the samples
-LOST_MOTION_SHARE = 0.03  # of the rated moment
+BELOW_NYQUIST = 0.45  # of the sampling rate: at 0.5 a held torque does not move a free mass at the samples
+LOST_MOTION_SHARE = 0.03  # of the rated load torque
 _AROUND = np.linspace(-1.0, 1.0, 17)  # of the spacing of the frequencies, a quarter as wide every round
 _ROUNDS = 12
 # Where the limit at zero frequency is decided on; is read (and at twice that), above the rounding of a pole
@@ -61,7 +61,7 @@ class StiffnessFigures:
 
     @property
     def lost_motion_rad(self) -> Any:
-        """At +-3 % of the largest load moment, never below the play; 0 of a rigid drive train."""
+        """At +-3 % of the largest load torque, never below the play; 0 of a rigid drive train."""
         return lost_motion_rad(self.design)
 
     def _smallest(self, read: Callable[[Compliance], Any]) -> Any:
@@ -136,7 +136,7 @@ def static_stiffness(response: Compliance) -> Any:
 
 def lost_motion_rad(design: Design) -> Any:
     """Lost motion at the output as gear makers read it, the motor held: the twist between the middles of the
-    hysteresis where the spring carries +-`LOST_MOTION_SHARE` of the largest load moment, play and twice m/k.
+    hysteresis where the spring carries +-`LOST_MOTION_SHARE` of the largest load torque, play and twice m/k.
 
     The load's friction has no part in it, as on a bench for gears: it widens the hysteresis, and where it is
     larger than m the play lies within that width.
@@ -204,5 +204,5 @@ def compliance(design: Design, at: Operating | None = None) -> Compliance:
     wired = wire(design, Operating() if at is None else at)
     program = TickProgram(wired, wired.outermost)
     ticks = [program.tick(k) for k in range(program.ticks)]
-    blocks = [siso(program, [tick], "moment", "output_angle") for tick in ticks]
+    blocks = [siso(program, [tick], "load_torque", "output_angle") for tick in ticks]
     return Compliance(pruned(blocks), wired.tick_s)

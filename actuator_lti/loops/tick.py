@@ -68,7 +68,7 @@ class TickProgram(Program):
 
     @cached_property
     def plant_steps(self) -> dict[str, tuple[list[Any], dict[int, Any], list[Any]]]:
-        """What makes each state of the plant after a tick: gains of torque and moment, voltages, states."""
+        """What makes each state of the plant after a tick: gains of both torques, voltages, states."""
         hold = self.drive.hold
         return {
             name: (

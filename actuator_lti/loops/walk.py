@@ -22,8 +22,8 @@ from actuator_lti.drive.blocks import Block, Realisation
 from actuator_lti.drive.wiring import BEHIND_FILTER, ERRORS, LAW_OUTPUT, Drive, present
 from actuator_lti.loops.rows import Row, total
 
-INPUTS = ("ref", "torque", "moment", "cut")
-"""Reference of the outer stage, torque in N m at the motor, moment on the output shaft, a cut signal."""
+INPUTS = ("ref", "torque", "load_torque", "cut")
+"""Reference of the outer stage, torque in N m at the motor, load torque on the output shaft, a cut signal."""
 OWN_SIGNALS = {"current": "i", "angle": "th", "output_angle": "output_angle", "output_speed": "output_speed"}
 """What a law of one's own takes of the plant as it is."""
 
@@ -156,13 +156,13 @@ class Walk(ABC):
         return reference
 
     def acting(self) -> tuple[Row, Row]:
-        """Torque at the motor and moment on the output shaft: from outside, and the drive's own."""
+        """Torque at the motor and load torque on the output shaft: from outside, and the drive's own."""
         plant = self.drive.plant
-        torque, moment = (
+        torque, load_torque = (
             Row.of(name) + total(gain * self.signals[row] for row, gain in own.items())
-            for name, own in (("torque", plant.torque), ("moment", plant.moment))
+            for name, own in (("torque", plant.torque), ("load_torque", plant.load_torque))
         )
-        return torque, moment
+        return torque, load_torque
 
     def at_cut(self, name: str, value: Row) -> Row:
         """Leave a signal behind; what goes on is the cut's input where it is cut here."""

@@ -10,7 +10,7 @@ from actuator_lti.margins.engine import stability_margins
 from actuator_lti.margins.results import StabilityMargins
 from actuator_lti.margins.single import Agreement, DelayMargin, DiskMargin, GainMargin, PhaseMargin
 from actuator_lti.measured.response import MeasuredResponse
-from actuator_lti.start.border import guard
+from actuator_lti.start.public_arguments import guard
 
 __all__ = [
     "Agreement",

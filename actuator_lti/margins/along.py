@@ -82,7 +82,7 @@ class Along:
         reason: str,
         delay_s: float,
         notes: tuple[str, ...] = (),
-        hidden_border: int = 0,
+        hidden_at_limit: int = 0,
         reals: tuple[Crossing, ...] | None = None,
     ) -> StabilityMargins:
         """The result, within the band; ``reals`` in place of its own."""
@@ -98,7 +98,7 @@ class Along:
             delay_s=delay_s,
             listed_to=self._listed_to,
             band_rad_s=self._band,
-            hidden_border=hidden_border,
+            hidden_at_limit=hidden_at_limit,
         )
 
     def nearest(self, distances: Sequence[Distance]) -> list[Place]:

@@ -49,7 +49,7 @@ def assembled(
     delay_s: float = 0.0,
     listed_to: float = math.inf,
     band_rad_s: tuple[float, float] | None = None,
-    hidden_border: int = 0,
+    hidden_at_limit: int = 0,
 ) -> StabilityMargins:
     """Put a result together, its margins within the band; without figures they are withheld."""
     verdict = _verdict(agreement)
@@ -70,7 +70,7 @@ def assembled(
         phase_margins, delay_margins(phase_margins, period_s),
         modulus, unwarped(at, period_s), DiskMargin(disk, unwarped(disk_at, period_s)),
         period_s, delay_s, band, method, agreement, (*notes, *_far_note(far)), evidence, reason,
-        hidden_border_modes=hidden_border,
+        hidden_modes_at_limit=hidden_at_limit,
     )  # fmt: skip
     return result if band_rad_s is None else _within(result, *band_rad_s)
 
@@ -88,13 +88,13 @@ def _far_note(far: int) -> tuple[str, ...]:
 
 
 def _verdict(agreement: Agreement) -> Verdict:
-    """From the two ways; both are asked only where no pole is on the border."""
+    """From the two ways; both are asked only where no pole is at the stability limit."""
     counts = {agreement.unstable_poles, agreement.unstable_nyquist} - {None}
     if not counts or not agreement.agree:
         return "undecided"
     if counts != {0}:
         return "unstable"
-    return "on the border" if agreement.border_poles else "stable"
+    return "at the stability limit" if agreement.poles_at_limit else "stable"
 
 
 def delay_margins(phase_margins: tuple[PhaseMargin, ...], period_s: float | None) -> tuple[DelayMargin, ...]:

@@ -21,7 +21,7 @@ _LEFT = 5.0  # times what the search does not tell from one
 _ONE = "the gain is one at an end of the axis"
 _FLOORS = (0.01, 0.1, 0.5, 0.9)  # gain: behind a delay margins are listed up to where L stays below
 _LEAST_GAIN = 1e-11
-_TOLD = 1e-12  # of the log gain, to either side of a place
+_CLEAR = 1e-12  # of the log gain, to either side of a place
 _MOST_TURNS = 100_000  # of the delay that are listed, about a second's work
 
 
@@ -56,7 +56,9 @@ def axis_parts(factors: Factored, band: tuple[float, float] | None) -> tuple[lis
         return [Part(factors, found, False)], listed_to, gain
     high, slope = _HIGH * most, factors.at_infinity
     if slope:
-        stop = _told(factors, max(high, 10.0 * high * math.exp(-factors.log_at(high)[0] / slope)), slope)
+        stop = _checked_end(
+            factors, max(high, 10.0 * high * math.exp(-factors.log_at(high)[0] / slope)), slope
+        )
         return [Part(factors, factors.search(low, stop), False)], math.inf, 0.0
     middle, mirrored = 2.0 * most, factors.reciprocal()
     first = Part(factors, factors.search(low, middle), False)
@@ -77,7 +79,7 @@ def _behind_delay(
 
     @cache
     def quiet(gain: float) -> float:
-        return float(factors.passages(low, high, math.log(gain) - _TOLD).max(initial=low))
+        return float(factors.passages(low, high, math.log(gain) - _CLEAR).max(initial=low))
 
     def search(to: float) -> tuple[Found, float]:
         found = _searched(factors, low, high, to)
@@ -108,7 +110,7 @@ def _start(factors: Factored, low: float) -> float:
         if abs(gain) < _NEAR_ONE:
             raise Doubtful(_ONE)
         return 0.0
-    return _told(factors, min(low, 0.1 * low * math.exp(-factors.log_at(low)[0] / order)), order)
+    return _checked_end(factors, min(low, 0.1 * low * math.exp(-factors.log_at(low)[0] / order)), order)
 
 
 def _off_one(factors: Factored, end: float) -> float:
@@ -125,7 +127,7 @@ def _off_one(factors: Factored, end: float) -> float:
     return end
 
 
-def _told(factors: Factored, end: float, slope: float) -> float:
+def _checked_end(factors: Factored, end: float, slope: float) -> float:
     """An end of the axis at which the side of the real axis on which the loop lies is known."""
     if not 1e-150 < end < 1e150:
         raise Doubtful("too wide a range")

@@ -83,7 +83,7 @@ def _poles_behind_delay(loop: RationalLoop, gain_w: Real) -> int | None:
     if loop.period_s is not None:
         return None  # part of a sample: no function of z
     free = sorted_poles(_closed(loop), False)
-    return None if free.doubtful or free.border else free.unstable + passed_into(loop, gain_w)
+    return None if free.doubtful or free.at_limit else free.unstable + passed_into(loop, gain_w)
 
 
 def passed_into(loop: RationalLoop, gain_w: Real) -> int:
@@ -101,10 +101,10 @@ def passed_into(loop: RationalLoop, gain_w: Real) -> int:
 
 
 def _trust_poles(loop: RationalLoop, poles: SortedPoles, closed: SortedPoles | None) -> None:
-    """Poles that are clear of the border, but for exact ones at zero frequency."""
-    if poles.doubtful or (closed is not None and (closed.border or closed.doubtful)):
+    """Poles that are clear of the stability limit, but for exact ones at zero frequency."""
+    if poles.doubtful or (closed is not None and (closed.at_limit or closed.doubtful)):
         raise Doubtful("a pole may lie on either side of the stability boundary")
-    if poles.border != poles.at_dc:
+    if poles.at_limit != poles.at_dc:
         raise Doubtful("open-loop poles lie on the stability boundary")
     if hardly_placed(loop, poles.values, False):
         raise Doubtful("rounding of the coefficients moves a pole across the stability boundary")

@@ -10,7 +10,7 @@ from actuator_lti.errors import NumericalError
 from actuator_lti.types import Complex, Ints, Mask, Real
 
 _EPS = float(np.finfo(float).eps)
-_SHARP = 1e-3  # a border pole's error, over its modulus
+_SHARP = 1e-3  # a pole at the limit's error, over its modulus
 _SAFE = 10.0
 
 
@@ -18,7 +18,7 @@ _SAFE = 10.0
 class SortedPoles:
     values: Complex  # (n,): all of them
     unstable: int  # how many lie strictly outside the stable region
-    border: int = 0  # how many lie on the border as far as double precision can tell
+    at_limit: int = 0  # how many lie at the limit as far as double precision can tell
     at_dc: int = 0  # how many of these lie at zero frequency
     # some pole, other than those at zero frequency, may lie on either side of the stability boundary
     doubtful: bool = False
@@ -53,9 +53,9 @@ def all_sorted(matrices: Sequence[Real], in_z: bool) -> list[SortedPoles]:
     """Sort the eigenvalues of matrices of one size (balanced).
 
     The error of an eigenvalue is bounded by 10 n eps (|v|* |A| |w|) / |v* w| with the left and right
-    eigenvectors v and w, entry by entry. It is on the border where that bound reaches the border and is much
+    eigenvectors v and w, entry by entry. It is at the stability limit where that bound reaches it and is much
     smaller than its modulus (at zero frequency: than that of the next one). Where the bound reaches the
-    border and is not small, the eigenvalue is simply not determined.
+    limit and is not small, the eigenvalue is simply not determined.
     """
     if not matrices[0].size:
         return [SortedPoles(np.empty(0, dtype=complex), 0)] * len(matrices)
@@ -86,9 +86,9 @@ def _by_parts(A: Real, in_z: bool, whole: SortedPoles) -> SortedPoles:
     if len(blocks := diagonal_blocks(A)) == 1:
         return whole
     parts = [all_sorted((A[np.ix_(own, own)],), in_z)[0] for own in blocks]
-    unstable, border, at_dc = np.sum([(part.unstable, part.border, part.at_dc) for part in parts], axis=0)
+    unstable, at_limit, at_dc = np.sum([(part.unstable, part.at_limit, part.at_dc) for part in parts], axis=0)
     values, doubtful = np.concatenate([p.values for p in parts]), any(p.doubtful for p in parts)
-    return SortedPoles(values, int(unstable), int(border), int(at_dc), doubtful)
+    return SortedPoles(values, int(unstable), int(at_limit), int(at_dc), doubtful)
 
 
 def _sorted(values: Complex, radius: Real, distance: Real, near: Mask, centre: float) -> SortedPoles:
@@ -98,11 +98,11 @@ def _sorted(values: Complex, radius: Real, distance: Real, near: Mask, centre: f
     beyond = [size[size > 10.0 * max(r, s)].min(initial=np.inf) for r, s in zip(radius, size, strict=True)]
     next_size = np.where(np.isinf(beyond), 0.0, beyond)
     placed = radius <= _SHARP * np.where(size > radius, np.abs(values), next_size)
-    on_border = (np.abs(distance) <= radius) & placed
-    unstable = int(np.count_nonzero((distance > 0.0) & ~on_border))
-    at_dc = int(np.count_nonzero(on_border & (size <= 2.0 * radius)))
+    at_limit = (np.abs(distance) <= radius) & placed
+    unstable = int(np.count_nonzero((distance > 0.0) & ~at_limit))
+    at_dc = int(np.count_nonzero(at_limit & (size <= 2.0 * radius)))
     doubtful = bool(near[values != centre].any())
-    return SortedPoles(values, unstable, int(np.count_nonzero(on_border)), at_dc, doubtful)
+    return SortedPoles(values, unstable, int(np.count_nonzero(at_limit)), at_dc, doubtful)
 
 
 def _with_error_bounds(matrices: Sequence[Real]) -> tuple[Complex, Real]:

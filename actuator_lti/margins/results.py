@@ -15,7 +15,7 @@ from actuator_lti.margins.single import (
 )
 
 _PRINTED = 8
-Verdict = Literal["stable", "unstable", "on the border", "undecided"]
+Verdict = Literal["stable", "unstable", "at the stability limit", "undecided"]
 Evidence = Literal["certified", "checked", "withheld"]
 
 
@@ -28,7 +28,7 @@ class StabilityMargins:
     a loop that is not stable. ``modulus_margin`` is the smallest distance of L to -1, for a stable loop 1
     over the peak of the sensitivity, ``disk_margin`` the balanced one (S + T).
 
-    For an unstable loop the crossings are still listed: they say how far it is from the border, and their
+    For an unstable loop the crossings are still listed: they say how far it is from stability, and their
     signs (a negative phase margin, a lower gain margin) say in which direction. Where stability is not
     known (measured data, or a withheld answer), ``stable`` is ``None``; a withheld answer has no figures at
     all (empty lists, ``None``).
@@ -39,13 +39,13 @@ class StabilityMargins:
       for data 8 ulp away.
     - ``"checked"``: in double precision; poles and Nyquist count agree, the parity of the crossovers is
       right, no pole lies within its own error of the stability boundary, and each figure has a small bound
-      of its error; behind a delay also from the zeros and poles of the exact polynomials, if 8 ulp of the
-      entries change nothing.
-    - ``"withheld"``: 8 ulp of the entries change the verdict or the crossings, so the data do not determine
-      them, or a search came to its end. The reason says which.
+      of its error; behind a delay also from the zeros and poles of the exact polynomials, if rounding of
+      the entries (8 ulp) changes nothing.
+    - ``"withheld"``: verdict or crossings are not resolved in double precision (8 ulp of the entries change
+      them), or a search came to its end. The reason says which.
 
     ``stable``: whether the closed loop is stable; a pole on the stability boundary is not stable.
-    ``verdict``: "stable", "unstable", "on the border" or "undecided".
+    ``verdict``: "stable", "unstable", "at the stability limit" or "undecided".
     ``gain_margins``, ``phase_margins``, ``delay_margins``: every one in the band, in order of frequency.
     ``period_s``: sampling period; None for a continuous loop.
     ``delay_s``: the extra delay that was asked for.
@@ -54,7 +54,7 @@ class StabilityMargins:
     ``notes``: what else has to be known to read the figures.
     ``evidence_reason``: why the evidence is what it is: one line.
     ``modulus_range``: where the modulus margin of measured data lies between the points and within noise.
-    ``hidden_border_modes``: integrators and undamped modes that the loop neither drives nor sees: `stable`
+    ``hidden_modes_at_limit``: integrators and undamped modes that the loop neither drives nor sees: `stable`
     and the margins are those of what is seen, `internally_stable` counts them.
     """
 
@@ -75,12 +75,12 @@ class StabilityMargins:
     evidence: Evidence = "checked"
     evidence_reason: str = ""
     modulus_range: tuple[float, float] | None = None
-    hidden_border_modes: int = 0
+    hidden_modes_at_limit: int = 0
 
     @property
     def internally_stable(self) -> bool | None:
         """Whether every mode decays, those too that the loop neither drives nor sees."""
-        return self.stable and not self.hidden_border_modes
+        return self.stable and not self.hidden_modes_at_limit
 
     @property
     def withheld(self) -> bool:
@@ -148,7 +148,7 @@ def _lines(m: StabilityMargins) -> list[str]:
     heads = {
         "stable": "closed loop: stable",
         "unstable": "closed loop: UNSTABLE (what follows are crossings, not margins)",
-        "on the border": "closed loop: ON THE BORDER, not stable",
+        "at the stability limit": "closed loop: AT THE STABILITY LIMIT, not stable",
         "undecided": "closed loop: stability not known",
     }
     lines = [heads[m.verdict] + f" [{m.agreement}]"]
@@ -160,7 +160,7 @@ def _lines(m: StabilityMargins) -> list[str]:
         label = f"{name} margin"
         if name == "delay" and m.stable is False:
             lines.append("delay margin: 0 s, as it is not stable")
-            label = "delay to the border"
+            label = "delay to the stability limit"
         elif not margins:
             lines.append(f"{label}: none")
         lines += [f"{label}: {margin}" for margin in margins[:_PRINTED]]

@@ -37,10 +37,10 @@ class AtFrequency:
 
 @dataclass(frozen=True)
 class GainMargin(AtFrequency):
-    """A real factor on the loop that brings a closed-loop pole to the border."""
+    """A real factor on the loop that brings a closed-loop pole to the stability limit."""
 
     ratio: float  # > 1: an upper limit, < 1: a lower limit
-    # Where the pole reaches the border; may be 0, the Nyquist frequency, or infinity (direct feed-through)
+    # Where the pole reaches it; may be 0, the Nyquist frequency, or infinity (direct feed-through)
     frequency_rad_s: float
     tangent: bool = False  # the curve touches the negative real axis there without crossing it
     # Of measured data: frequencies between which the crossing lies, and where the ratio does, with the noise
@@ -61,7 +61,7 @@ class GainMargin(AtFrequency):
 
 @dataclass(frozen=True)
 class PhaseMargin(AtFrequency):
-    """A phase lag (negative: a lead) that brings a closed-loop pole to the border."""
+    """A phase lag (negative: a lead) that brings a closed-loop pole to the stability limit."""
 
     deg: float  # 180 deg plus the phase of the loop, in (-180, 180]
     frequency_rad_s: float  # the gain crossover
@@ -78,7 +78,7 @@ class PhaseMargin(AtFrequency):
 
 @dataclass(frozen=True)
 class DelayMargin(AtFrequency):
-    """The smallest delay in the loop that brings a closed-loop pole to the border at this gain crossover."""
+    """The smallest delay in the loop that brings a closed-loop pole at this gain crossover to the limit."""
 
     seconds: float
     samples: float | None  # the same in sampling periods; None for a continuous loop
@@ -129,18 +129,18 @@ class Agreement:
 
     unstable_poles: int | None  # None where a way does not apply
     unstable_nyquist: int | None
-    border_poles: int = 0  # on the stability boundary itself
+    poles_at_limit: int = 0  # on the stability boundary itself
 
     @property
     def agree(self) -> bool:
         """Whether the two ways do not contradict each other."""
-        if self.unstable_poles is None or self.unstable_nyquist is None or self.border_poles:
+        if self.unstable_poles is None or self.unstable_nyquist is None or self.poles_at_limit:
             return True
         return self.unstable_poles == self.unstable_nyquist
 
     def __str__(self) -> str:
-        if self.border_poles:
-            return f"{self.border_poles} closed-loop pole(s) on the stability boundary"
+        if self.poles_at_limit:
+            return f"{self.poles_at_limit} closed-loop pole(s) on the stability boundary"
         ways = (("poles", self.unstable_poles), ("Nyquist count", self.unstable_nyquist))
         only = [f"{way} only: {count} unstable" for way, count in ways if count is not None]
         if len(only) < 2:

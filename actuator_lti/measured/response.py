@@ -197,9 +197,9 @@ def scatter_of_repeats(size: Real, squared: Real, count: Ints) -> tuple[Real, Re
 
     square, total = np.maximum(size, 1e-100) ** 2, nearby(freedom)
     every = np.maximum(total, 1.0)
-    alike, over = nearby(squared), nearby(squared / square)
-    likelier = over * np.exp(nearby(freedom * np.log(square)) / every) < alike
-    return np.sqrt(np.where(likelier, square * over, alike) / every / count), total
+    even, over = nearby(squared), nearby(squared / square)
+    likelier = over * np.exp(nearby(freedom * np.log(square)) / every) < even
+    return np.sqrt(np.where(likelier, square * over, even) / every / count), total
 
 
 def at_once(radius: Real) -> Real:

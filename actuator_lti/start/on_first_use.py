@@ -5,7 +5,7 @@ from collections.abc import Callable, Collection, Mapping
 from importlib import import_module
 from typing import Any
 
-from actuator_lti.start.border import guarded
+from actuator_lti.start.public_arguments import guarded
 
 
 def on_first_use(

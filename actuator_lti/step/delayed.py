@@ -37,7 +37,7 @@ def delayed_response(system: Any) -> tuple[Motion, float, Pieces]:
     form = delay_form(system)
     form = replace(form, whole=balanced(form.whole))
     poles, at_rest = sorted_poles(collocated(form, _POINTS), False), DelayResponse.of(form)
-    if at_rest.order > 0 or poles.unstable or poles.border > 1:
+    if at_rest.order > 0 or poles.unstable or poles.at_limit > 1:
         raise InputError(UNSTABLE)
     if at_rest.order:
         raise InputError(NO_FINAL)

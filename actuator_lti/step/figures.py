@@ -149,6 +149,6 @@ def _notes(loop: RationalLoop) -> tuple[str, ...]:
     if moved < 0.01:
         return ()
     return (
-        f"{ULP} units in the last place of the coefficients move the final value by {100 * moved:.2g} %: "
+        f"rounding of the coefficients moves the final value by {100 * moved:.2g} %: "
         "the figures are those of the coefficients as given; a state space would hold the system better",
     )

@@ -139,7 +139,7 @@ def rational_motion(system: Any, loop: RationalLoop) -> tuple[Motion, float, int
             poles = [(1 + p) / (1 - p) for p in poles]
         return _free_motion(acb_poly(arb_poly(rest)), poles, exact.sampled)
 
-    hidden = exact.hidden_modes.on_border - exact.hidden_modes.at_zero + exact.hidden_at_end
+    hidden = exact.hidden_modes.at_limit - exact.hidden_modes.at_zero + exact.hidden_at_end
     return at_enough_bits(motion, _FIRST_BITS, "a pole of the step response"), final, hidden
 
 
@@ -154,7 +154,7 @@ def _poles(exact: ExactLoop, loop: RationalLoop) -> list[acb]:
     poles = exact.poles
     hidden = (p for p in exact.hidden_modes.roots if not p.contains(0) and not near_dc(p, loop))
     at_end = exact.degree > exact.D.degree()
-    if poles.right or poles.on_border > poles.at_zero or at_end or any(p.real > 0 for p in hidden):
+    if poles.right or poles.at_limit > poles.at_zero or at_end or any(p.real > 0 for p in hidden):
         raise InputError(UNSTABLE)
     if poles.at_zero:
         raise InputError(_INTEGRATES if poles.at_zero == 1 else UNSTABLE)

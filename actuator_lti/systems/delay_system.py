@@ -9,7 +9,7 @@ A `DelaySystem` is a state space in linear fractional form with a bank of delays
 Series, parallel and feedback connection only rearrange these matrices, so nested loops keep every delay
 exactly, and the frequency response is that of the delays themselves: nowhere a Pade approximation, unless
 `DelaySystem.pade` is asked for one. python-control's plots, ``margin`` and time responses take it as it is,
-see `actuator_lti.systems.control_face`.
+see `actuator_lti.systems.control_interface`.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from control.iosys import InputOutputSystem
 
 from actuator_lti.errors import InputError, delay_number, shown, whole_number
 from actuator_lti.margins.loop import rational_loop
-from actuator_lti.systems.control_face import ControlFace
+from actuator_lti.systems.control_interface import ControlInterface
 from actuator_lti.systems.plain_system import PlainDelaySystem, descriptor, in_parallel, in_series, response
 
 _PARTS = (*PlainDelaySystem.parts, "delays_s")
@@ -38,7 +38,7 @@ def _matrix(value: Any, rows: int, columns: int, name: str) -> np.ndarray:
     return array
 
 
-class DelaySystem(ControlFace):
+class DelaySystem(ControlInterface):
     """A continuous system with internal delays, see the module for the equations.
 
     ``A, B1, B2, C1, C2, D11, D12, D21, D22``: shapes (n,n), (n,m), (n,k), (p,n), (k,n), (p,m), (p,k), (k,m),

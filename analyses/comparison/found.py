@@ -56,7 +56,7 @@ def small_signal(design: Design, result: Mapping[str, LoopFigures]) -> dict[str,
         for name, quantity in LOOP_QUANTITIES.items():
             value = quantity.read(one) if one.stable else None
             figures[f"{loop}.{name}"] = None if value is None else float(value)
-    stands = all(one.sound is not False for one in result.values())
+    stands = all(one.is_stable is not False for one in result.values())
     for name, load in drive_cases(design.validation.loads_Nm):
         value = float(drive_figure(design, name, load))
         there = stands or QUANTITIES[name].source != "stiffness"
@@ -88,10 +88,10 @@ class LargeSignal:
         figures: dict[str, float | None] = {}
         for frequency in self.frequencies_hz:
             try:
-                border = with_cogging(loops, onset(loops, [2 * pi * frequency]))
+                linear_limit = with_cogging(loops, onset(loops, [2 * pi * frequency]))
             except InputError:
                 continue  # beyond Nyquist of the position loop
-            figures[f"large.onset@{frequency:g}"] = float(border.amplitude_rad[0]) * shown
+            figures[f"large.onset@{frequency:g}"] = float(linear_limit.amplitude_rad[0]) * shown
         for load in self.loads_Nm:
             step = StepCheck(self.deflection_rad, self.duration_s, load)
             columns = step_columns(step, Population(design, {}, 1))

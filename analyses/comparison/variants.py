@@ -30,7 +30,7 @@ from analyses.studies.study import Study, Variant, load_study
 from analyses.validation import CHECKS, validate
 from analyses.validation.row import Row
 
-_ALIKE = 1e-12  # relative; differences below are rounding
+_EQUAL = 1e-12  # relative; differences below are rounding
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -161,7 +161,7 @@ def _evaluated(variant: Variant, plan: LargeSignal, tested: bool) -> Found:
     return Found(
         figures={**found.small_signal(design, result), **plan.figures(design, loops)},
         verdicts=evaluate_requirements(design, result),
-        unstable=tuple(name for name, one in result.items() if one.sound is False),
+        unstable=tuple(name for name, one in result.items() if one.is_stable is False),
         checks=checks,
         untested=untested,
     )
@@ -177,7 +177,7 @@ def _beside(base: Found, origin: Design, plan: LargeSignal, tested: bool, at: tu
         before = base.figures.get(key)
         if value is None or before is None or not (isfinite(value) and isfinite(before)):
             continue
-        if abs(value - before) > _ALIKE * max(abs(value), abs(before)):
+        if abs(value - before) > _EQUAL * max(abs(value), abs(before)):
             differences[key] = value - before
     moved = _moved_by(origin, design, changed, differences)
     return replace(one, changed=changed, differences=differences, moved_by=moved)

@@ -37,8 +37,8 @@ class Corner:
     @property
     def tally(self) -> Tally:
         """The requirements, that every loop is stable, and that no value contradicts another."""
-        sound = (one.sound for one in self.figures.values())
-        return tally(self.verdicts) + Tally.of(map(Verdict.of, (*sound, *(False for _ in self.refused))))
+        is_stable = (one.is_stable for one in self.figures.values())
+        return tally(self.verdicts) + Tally.of(map(Verdict.of, (*is_stable, *(False for _ in self.refused))))
 
     @property
     def passed(self) -> bool:

@@ -19,7 +19,7 @@ from analyses.records.inputs import lacking
 from analyses.records.naming import LOADS
 from analyses.records.record import HELD, SMOOTH, STRAIGHT, Record
 from nonlinear import State, commands, loads
-from nonlinear.loads import LoadMoment
+from nonlinear.loads import LoadTorque
 
 STAGES = ("position", "velocity", "current", "voltage")
 COMMANDS: Mapping[tuple[str, str], tuple[str, ...]] = {
@@ -244,8 +244,8 @@ def supply_of(driven: Driven, record: Record, time_s: Floats, notes: list[str]) 
     return {"supply": commands.sampled(time_s, values, where=record.name), "supply_scales": scales}
 
 
-def load_of(design: Design, record: Record, time_s: Floats, notes: list[str]) -> tuple[Design, LoadMoment]:
-    """The recorded load, which holds all of it; without one, the design's own moments act."""
+def load_of(design: Design, record: Record, time_s: Floats, notes: list[str]) -> tuple[Design, LoadTorque]:
+    """The recorded load, which holds all of it; without one, the design's own load torques act."""
     name, own = LOADS[design.axis], design.load.acting()
     if name not in record.signals:
         notes.extend(f"load: the design's {key} acts" for key in own)

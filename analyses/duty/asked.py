@@ -7,7 +7,7 @@ from math import inf, isfinite, pi
 from typing import TYPE_CHECKING, Annotated
 
 from actuator_lti.errors import InputError
-from actuator_lti.start.border import asked
+from actuator_lti.start.public_arguments import asked
 from analyses.request import Option, given, key_of
 
 if TYPE_CHECKING:

@@ -85,8 +85,8 @@ def solve(w: Floats, y: Floats, ends: Sequence[int] = ()) -> Solution:
     Raises `InputError`: where there are no more rows than values.
     """
     if len(y) <= w.shape[1]:
-        told = f"{len(y)} sample(s) are left to fit {w.shape[1]} parameter(s)"
-        raise InputError(f"{told}; allowed: longer motion")
+        reason = f"{len(y)} sample(s) are left to fit {w.shape[1]} parameter(s)"
+        raise InputError(f"{reason}; allowed: longer motion")
     values = scaled_lstsq(w, y)
     residual = np.asarray(y - w @ values)
     return Solution(

@@ -1,4 +1,4 @@
-"""What a drive does when a part of it fails: deflection, current and moment over time."""
+"""What a drive does when a part of it fails: deflection, current and torque over time."""
 
 from actuator_lti.start.on_first_use import from_rooms
 

@@ -1,4 +1,4 @@
-"""The failures, and the rig that they happen on: controller and plant of one drive as two.
+"""The failures, and the drive that they happen on, split into its controller and its plant.
 
 The controller is the drive's own on measured values; the plant is the same drive without its loops, a voltage
 in.  Nothing failed, the two together are the drive (`nonlinear.simulate`) bit for bit.
@@ -38,7 +38,7 @@ def plant_of(design: Design) -> Design:
     return replace(design, controller=bare, limits=limits, command=Command(), instruments=Instruments())
 
 
-class Rig:
+class SplitDrive:
     """The two halves; ``sensing`` changes what the controller gets, ``driving`` the voltage by (u, U_bus)."""
 
     def __init__(self, design: Design, load_Nm: float) -> None:
@@ -50,9 +50,9 @@ class Rig:
         self.driving: Driving | None = None
         self.moment_Nm, self.jammed = 0.0, False
 
-    def copy(self) -> Rig:
-        """Another rig in the same state, nothing failed."""
-        twin = Rig(self.design, self.load_Nm)
+    def copy(self) -> SplitDrive:
+        """Another one in the same state, nothing failed."""
+        twin = SplitDrive(self.design, self.load_Nm)
         twin.controller.set(self.controller.get())
         twin.plant.set(self.plant.get())
         return twin
@@ -76,7 +76,7 @@ class Rig:
         return self.plant.value("angle") / self.ratio if rigid else self.plant.value("output")
 
     def whole(self, command: float) -> Running:
-        """The drive as one, from rest, under a command that stays: the rig before a failure, bit for bit."""
+        """The drive as one, from rest, under a command that stays: the two before a failure, bit for bit."""
         rows = Rows.of(replace(self.design, instruments=Instruments()))
         rows["load"] = self.load_Nm
         rows.step("command", command)
@@ -136,7 +136,7 @@ class Rig:
 
 HELD = 1e6  # times the stall torque: no torque of the drive moves a jam
 
-Course = Callable[[float], float]
+CommandOverTime = Callable[[float], float]
 
 
 @dataclass(frozen=True)
@@ -144,9 +144,9 @@ class Case:
     """One failure."""
 
     name: str
-    words: str  # with {speed} and {energy} as in `Rig.turning`
-    command: Course  # command over the time from the failure on (from the step on, where ``at_rad`` is given)
-    broken: Callable[[Rig], None] = lambda _: None  # what is done to the rig
+    words: str  # with {speed} and {energy} as in `SplitDrive.turning`
+    command: CommandOverTime  # from the failure on (from the step on, where ``at_rad`` is given)
+    broken: Callable[[SplitDrive], None] = lambda _: None  # what is done to the split drive
     start: float = 0.0  # command that the drive follows before
     at_rad: float | None = None  # when the output is this far from the start; ``None``: at once
     stops: bool = True  # whether the run ends at the stop
@@ -223,9 +223,9 @@ def _of_current(design: Design, asked: Asked) -> tuple[Case, ...]:
     )
 
 
-def _jam(rig: Rig) -> None:
-    rig.fail(jammed(rig.design))
-    rig.jammed = True
+def _jam(split: SplitDrive) -> None:
+    split.fail(jammed(split.design))
+    split.jammed = True
 
 
 def _swings(design: Design, size: float, around: float = 0.0) -> Iterator[Case]:
@@ -239,8 +239,8 @@ def _swings(design: Design, size: float, around: float = 0.0) -> Iterator[Case]:
         yield Case("oscillatory-command", words, command, start=around, stops=False)
 
 
-def _hard_over(rig: Rig, *, way: float) -> None:
-    rig.driving = lambda _, bus: way * bus
+def _hard_over(split: SplitDrive, *, way: float) -> None:
+    split.driving = lambda _, bus: way * bus
 
 
 def jammed(design: Design) -> Design:
@@ -256,21 +256,21 @@ def jammed(design: Design) -> Design:
     return replace(design, load=replace(design.load, friction=held))
 
 
-def _open(rig: Rig) -> None:
+def _open(split: SplitDrive) -> None:
     """No current flows."""
-    rig.driving = lambda _, bus: 0.0
-    rig.fail(replace(rig.design, motor=rig.design.motor.without_current, supply=None, temperature=None))
+    split.driving = lambda _, bus: 0.0
+    split.fail(replace(split.design, motor=split.design.motor.without_current, supply=None, temperature=None))
 
 
-def _sense(rig: Rig, *, zero: bool = False) -> None:
+def _sense(split: SplitDrive, *, zero: bool = False) -> None:
     """Freeze the outermost loop's sensor, or let it read zero; a speed taken from it is zero."""
-    stage = rig.design.controller.outermost
+    stage = split.design.controller.outermost
     if stage == "current":
-        rig.sensing = lambda true: replace(true, current_A=0.0)
+        split.sensing = lambda true: replace(true, current_A=0.0)
         return
-    sensor, part = getattr(rig.design.controller, stage).sensor, 0.0 if zero else 1.0
-    angle = part * getattr(rig.measured(), f"{sensor}_angle_rad")
-    rig.sensing = lambda true: replace(true, **{f"{sensor}_angle_rad": angle, f"{sensor}_speed_rad_s": 0.0})
+    sensor, part = getattr(split.design.controller, stage).sensor, 0.0 if zero else 1.0
+    angle = part * getattr(split.measured(), f"{sensor}_angle_rad")
+    split.sensing = lambda true: replace(true, **{f"{sensor}_angle_rad": angle, f"{sensor}_speed_rad_s": 0.0})
 
 
 def _sines(design: Design, size: float) -> Iterator[tuple[float, str]]:

@@ -37,8 +37,8 @@ class Orbit:
         before = self._before(stand)
         if stand >= middle:
             return self._error(before, middle)
-        z = _course(np.zeros(2), stand) @ [*before, self._error(before, 0.0), self.rate_rad_s]
-        z = _course(self.gains, middle - stand) @ [*z, self._level(stand), self.growth_rad_s]
+        z = _transition(np.zeros(2), stand) @ [*before, self._error(before, 0.0), self.rate_rad_s]
+        z = _transition(self.gains, middle - stand) @ [*z, self._level(stand), self.growth_rad_s]
         return float(self.level_rad - self.gains @ z)
 
     def _stand_s(self) -> float | None:
@@ -53,13 +53,13 @@ class Orbit:
     def _surplus(self, stand_s: float) -> float:
         """By how much e + k.z is beyond breakaway after so long a stand."""
         before = self._before(stand_s)
-        z = _course(np.zeros(2), stand_s) @ [*before, self._error(before, 0.0), self.rate_rad_s]
+        z = _transition(np.zeros(2), stand_s) @ [*before, self._error(before, 0.0), self.rate_rad_s]
         beyond = self._level(stand_s) - self.level_rad + self.breakaway_rad
         return float(self._error(before, stand_s) + self.gains @ z - beyond)
 
     def _before(self, stand_s: float) -> Floats:
         """The integrals at a reversal, which have the other sign at the next one."""
-        stand, slide = _course(np.zeros(2), stand_s), _course(self.gains, self.half_s - stand_s)
+        stand, slide = _transition(np.zeros(2), stand_s), _transition(self.gains, self.half_s - stand_s)
         over = slide[:, :2] @ (stand[:, :2] - np.outer(stand[:, 2], self.gains))
         moved = slide[:, :2] @ stand[:, 2:] @ [-self._level(self.half_s), self.rate_rad_s]
         moved += slide[:, 2:] @ [self._level(stand_s), self.growth_rad_s]
@@ -74,7 +74,7 @@ class Orbit:
         return self.level_rad + self.growth_rad_s * (time_s - 0.5 * self.half_s)
 
 
-def _course(gains: Floats, time_s: float) -> Floats:
+def _transition(gains: Floats, time_s: float) -> Floats:
     """From z, x and the slope of x to z after a time of dz1/dt = x - gains.z, dz2/dt = z1; shape (2, 4)."""
     rates = np.array([[*-gains, 1.0, 0.0], [1.0, 0.0, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0], [0.0, 0.0, 0.0, 0.0]])
     return np.asarray(expm(rates * time_s)[:2])

@@ -14,7 +14,7 @@ from analyses.friction_effects.breakaway import Threshold, threshold
 from analyses.friction_effects.reversal import Hysteresis, hysteresis
 from analyses.large_signal.tones import settling_ticks_in_periods
 from analyses.limit_cycles.describing import Cycle, at_load, cycles_of_friction, dry_Nm
-from analyses.limit_cycles.run import Confirmation, confirm
+from analyses.limit_cycles.run import CycleResult, confirm
 from analyses.limit_cycles.stick_slip import StickSlipCycle, stick_slip_cycle
 from analyses.motion.settling import Settling, noticed, settlings_of
 from analyses.specification.capability import drive_figures
@@ -27,7 +27,7 @@ class LimitCycles:
     """Everything about limit cycles at one load torque."""
 
     design: Design  # without counts and noise
-    confirmations: tuple[Confirmation, ...]  # empty: the describing function predicts none
+    cycles: tuple[CycleResult, ...]  # empty: the describing function predicts none
     stick_slip: StickSlipCycle | None  # what the analysis of rest, breakaway and slip predicts beside it
     settlings: tuple[Settling, ...]  # steps of several sizes: the drive rests, breaks away, and may hunt
 
@@ -43,8 +43,8 @@ class LimitCycles:
 
     def right(self, *predicted: bool) -> bool:
         """Whether a stable cycle is predicted exactly where a step ends in one, and all are confirmed."""
-        stable = any((*predicted, *(item.cycle.stable for item in self.confirmations)))
-        return all(item.verdict == "confirmed" for item in self.confirmations) and stable == self.by_friction
+        stable = any((*predicted, *(item.cycle.stable for item in self.cycles)))
+        return all(item.verdict == "confirmed" for item in self.cycles) and stable == self.by_friction
 
     @property
     def described(self) -> bool:
@@ -67,13 +67,13 @@ def limit_cycles(
     sliding ``loops``, ``settlings`` of the drive as it is, of which those at rest are not asked again.
     """
     given, design = design, quiet(design)
-    alike = np.array_equal(Rows.of(given).values, Rows.of(design).values)
+    equal = np.array_equal(Rows.of(given).values, Rows.of(design).values)
     if predicted is None:
         predicted = described_cycles(design, load_Nm)
     checked = tuple(confirm(design, cycle) for cycle in predicted)
     slips = stick_slip_cycle(design, load_Nm, loops)
     known = tuple(one for one in settlings or () if one.load_Nm == load_Nm)
-    steps = known if known and alike else settlings_of(design, loops, (load_Nm,), known)
+    steps = known if known and equal else settlings_of(design, loops, (load_Nm,), known)
     return LimitCycles(design, checked, slips, steps)
 
 

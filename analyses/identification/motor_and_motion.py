@@ -12,7 +12,7 @@ from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError, NumericalError
 from actuator_lti.types import Floats
 from analyses.correlation.closed_loop import AXIS_SIGNALS
-from analyses.correlation.driving import command_of, readings
+from analyses.correlation.driving import Driven, command_of, readings
 from analyses.correlation.following import moved_by_clock
 from analyses.estimation.fit import Fit
 from analyses.identification import to_design
@@ -82,8 +82,8 @@ class Sought:
         """
         plain, settings = self.plain, self.settings
         commands = [(command_of(plain, record), record) for record in records]
-        read = {one.between: None for own, record in commands if own for one in readings(own, record)}
-        betweens = sorted(read or [SMOOTH], key=HELD.__eq__)
+        read = {between for own, record in commands for between in self._ways(own, record)}
+        betweens = sorted(read, key=HELD.__eq__)
         ways = [[replace(one, between=way) for one in records] for way in betweens]
         moves = {own.stage for own, _ in commands if own} <= {"position", "velocity"}
         simulated = moves and settings.electrical and settings.friction != "map" and not self.gravity
@@ -97,7 +97,9 @@ class Sought:
             for taken in ways[:-1]:
                 with suppress(InputError, NumericalError):
                     tried += self._together(tried, taken) or []
-        misses = _misses(plain, [_both_ways(one) for one in tried])
+        if not (told := all(own is not None for own, _ in commands)):
+            tried = [one for one in tried if one.right.model.bias] or tried
+        misses = _misses(plain, [_both_ways(one) for one in tried]) if told else _left(tried)
         best = int(np.argmin(np.sum(misses, axis=1)))
         best_one = tried[best]
         for other, more in zip(tried, misses - misses[best], strict=True):
@@ -105,6 +107,13 @@ class Sought:
                 share = float(wilcoxon(more, alternative="greater").pvalue)
                 best_one = _widened(plain, best_one, other, share)
         return best_one
+
+    def _ways(self, own: Driven | None, record: Record) -> set[str]:
+        """How a command may go on between the rows; one that is not recorded smooth or, of few rows, held."""
+        if own is not None:
+            return {one.between for one in readings(own, record)}
+        slow = self.plain.controller.position and record.period_s > 1.5 * self.plain.controller.period_s
+        return {SMOOTH, HELD} if slow else {SMOOTH}
 
     def _with_scale_of_current(self, motor: ElectricalFit, right: Diagnosed) -> Found:
         """What was found; what the current may be too small by is in R and L as it is in all torques."""
@@ -232,6 +241,21 @@ def _misses(design: Design, tried: Sequence[Both]) -> Floats:
         blocks = np.array_split(rows, int(np.sqrt(rows.shape[1])), axis=1)
         sums.append(np.transpose([np.sum(block, axis=1) for block in blocks]))
     return np.concatenate(sums, axis=1)
+
+
+def _left(tried: Sequence[Found]) -> Floats:
+    """The same of what simulated records leave of the fit's rows, where a command was learnt from the motion.
+
+    Such a motion is that of the record in any way: how the loops had the current between the rows is not.
+    """
+    rows = []
+    for model in (one.right.model for one in tried):
+        whole = [np.zeros(len(part.keep)) for part in model.records]
+        for weight, part, values in zip(model.weights, model.records, whole, strict=True):
+            values[np.flatnonzero(part.keep)[part.compared]] = weight * part.noise
+        rows.append(np.concatenate(whole) ** 2)
+    off = 0.5 * np.array(rows) / max(np.min(np.mean(rows, axis=1)), 1e-300)
+    return np.transpose([np.sum(b, axis=1) for b in np.array_split(off, int(np.sqrt(off.shape[1])), axis=1)])
 
 
 def _missed(design: Design, own: Record, like: Record, name: str) -> Floats:

@@ -164,8 +164,8 @@ def moment_of(
 ) -> tuple[Floats, str]:
     """The moment at the output and the signal that it comes from.
 
-    Without a recorded one, that of the design's own moments and (with ``gravity``) pendulum at the recorded
-    angle; the signal is then empty.
+    Without a recorded one, that of the design's own load torques and (with ``gravity``) pendulum at the
+    recorded angle; the signal is then empty.
     """
     name = LOADS[design.axis]
     if name in record.signals:
@@ -251,7 +251,7 @@ class _Balance:
 
 
 def _balance(design: Design, record: Record, recipe: Recipe, *, gravity: bool) -> _Balance:
-    """The drive torque less known moments, cogging and what the load side takes.
+    """The drive torque less known torques, cogging and what the load side takes.
 
     ``gravity``: the pendulum is looked for, and not known.
     """

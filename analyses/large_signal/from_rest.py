@@ -105,7 +105,7 @@ TOO_MANY = 40_000_000  # ticks of the values asked about one margin, as where th
 
 @dataclass(frozen=True)
 class AmplitudeMargin:
-    """Where an oscillation lasts after a release from one deviation."""
+    """Where an oscillation lasts after an initial deviation."""
 
     loop: str
     kind: str  # ``"gain"`` or ``"delay"``
@@ -137,43 +137,43 @@ def margins_by_amplitude(bench: Bench) -> Iterator[AmplitudeMargin]:
             hertz = margins.delay_margin.frequency_rad_s / (2.0 * np.pi)
             asked.append(("delay", margins.delay_margin.samples, hertz))
         for (kind, linear, hertz), size, friction_on in product(asked, SIZES, (False, True)[: 1 + rough]):
-            release = _Release(bench, name, kind, hertz, SIZES[size], friction_on)
-            value, seen = _first(release, linear)
+            response = _InitialConditionResponse(bench, name, kind, hertz, SIZES[size], friction_on)
+            value, seen = _first(response, linear)
             found = (linear, value, FURTHEST * linear, bench.setup(name).period_s, *seen)
-            about = (bench.design.axis, release.coarser, release.too_long)
+            about = (bench.design.axis, response.coarser, response.too_long)
             yield AmplitudeMargin(name, kind, size, SIZES[size], friction_on, *found, *about)
 
 
-def _first(release: _Release, linear: float) -> tuple[float | None, tuple[str, float]]:
+def _first(response: _InitialConditionResponse, linear: float) -> tuple[float | None, tuple[str, float]]:
     """The first value at which an oscillation lasts, closed in from the one before; none beyond is asked."""
     low = -1.0
-    for value in _asked(release, linear):
-        if (seen := release.lasting(value)) is not None:
+    for value in _asked(response, linear):
+        if (seen := response.lasting(value)) is not None:
             break
         low = value
     else:
         return None, ("", nan)
     while low >= 0.0 and value - low > CLOSE * value:
         middle = 0.5 * (low + value)
-        lasting = release.lasting(middle)
+        lasting = response.lasting(middle)
         low, value, seen = (middle, value, seen) if lasting is None else (low, middle, lasting)
     return value, seen
 
 
-def _asked(release: _Release, linear: float) -> list[float]:
+def _asked(response: _InitialConditionResponse, linear: float) -> list[float]:
     """The drive as it is, then values from well below the linear margin to well beyond it."""
-    kind = release.kind
-    if release.too_long:
+    kind = response.kind
+    if response.too_long:
         return []
-    if release.coarser:
+    if response.coarser:
         near = [linear * (1.0 + CLOSE) ** power for power in (-1, 0, 1, 3, 7, 15, 31)]
         return [0.0, linear / 4.0, *near, FURTHEST * linear]
     least = max(linear / 3.0, 1.05) if kind == "gain" else linear / 20.0
     return [1.0 if kind == "gain" else 0.0, *np.geomspace(least, FURTHEST * linear, VALUES).tolist()]
 
 
-class _Release:
-    """Runs of one loop let go from a deviation."""
+class _InitialConditionResponse:
+    """Responses of one loop to an initial deviation."""
 
     def __init__(
         self, bench: Bench, name: str, kind: str, hertz: float, part: float, friction_on: bool
@@ -182,7 +182,7 @@ class _Release:
         self.kind, self.part, self.sizes = kind, part, full_range(design)
         setup, still = bench.setup(name), OperatingMotion(0.0, 0.0, 0.0, friction_on)
         if setup.outer != design.controller.outermost:
-            # The load's own moment as a constant, held: where it changes, it swings open outer loops
+            # The load's own torque as a constant, held: where it changes, it swings open outer loops
             held, coupling = setup.design, setup.design.coupling
             carried = holding_moment_Nm(held)
             twist = (

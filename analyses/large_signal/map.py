@@ -112,10 +112,10 @@ def amplitude_map(
     threshold = static_threshold(design, load_Nm).smallest_rad if friction_on else None
     levels = tones.amplitudes(design, counts[0], threshold or None)
     start = linear_steady_state(loops, omega)
-    border, slow = with_cogging(loops, onset(loops, omega)), slow_protection(design, loops)
+    linear_limit, slow = with_cogging(loops, onset(loops, omega)), slow_protection(design, loops)
     which = np.tile(np.arange(len(omega)), len(levels))
     amplitude, linear = np.repeat(levels, len(omega)), start.output[which]
-    begin = np.minimum(amplitude, BELOW_ONSET * border.amplitude_rad[which])
+    begin = np.minimum(amplitude, BELOW_ONSET * linear_limit.amplitude_rad[which])
     result = run_tones(
         design, frequencies, which, amplitude, start, begin,
         load_Nm=load_Nm, friction_on=friction_on, insist=True,
@@ -137,7 +137,7 @@ def amplitude_map(
         distortion=result.distortion("output_angle_rad").reshape(shape),
         unsteadiness=result.unsteadiness("output_angle_rad").reshape(shape),
         response=(result.phasor("output_angle_rad") / amplitude).reshape(shape), linear=start.output,
-        onset_rad={name: a for name, a in border.each_rad.items() if name not in slow},
+        onset_rad={name: a for name, a in linear_limit.each_rad.items() if name not in slow},
         ticks=int(result.column("ticks").sum()), coarser=counts != given,
     )  # fmt: skip
 

@@ -63,9 +63,9 @@ def limit_shift(design: Design, loops: Loops, count: int = COUNT) -> LimitShift 
     within = min(count, max(int(count * MOST_TICKS / work), LEAST))
     chosen = tones(design, loops, within)
     omega = np.array([t.omega_rad_s for t in chosen])
-    border, start = onset(loops, omega), linear_steady_state(loops, omega, SETTLED)
-    there = np.isfinite(border.amplitude_rad)
-    limited, linear = np.flatnonzero(there), border.amplitude_rad[there]
+    linear_limit, start = onset(loops, omega), linear_steady_state(loops, omega, SETTLED)
+    there = np.isfinite(linear_limit.amplitude_rad)
+    limited, linear = np.flatnonzero(there), linear_limit.amplitude_rad[there]
     if not (start.stable and limited.size):
         return None
 
@@ -74,9 +74,9 @@ def limit_shift(design: Design, loops: Loops, count: int = COUNT) -> LimitShift 
         return limiter_fractions(run_tones(design, chosen, limited, amplitude, start, begin, harmonics=1))
 
     simulated, names = np.full(len(omega), np.nan), np.full(len(omega), "", dtype=object)
-    simulated[limited], names[limited] = _bisect(acting, linear, [border.active[k] for k in limited])
+    simulated[limited], names[limited] = _bisect(acting, linear, [linear_limit.active[k] for k in limited])
     resolution, gain = (TRIED[1] / TRIED[0]) ** (0.5**ROUNDS) - 1.0, _command_gain(given, loops, omega)
-    found = np.where(there, border.amplitude_rad, np.nan), simulated, border.active, tuple(names)
+    found = np.where(there, linear_limit.amplitude_rad, np.nan), simulated, linear_limit.active, tuple(names)
     return LimitShift(omega / (2.0 * np.pi), *found, resolution, gain, within < count)
 
 

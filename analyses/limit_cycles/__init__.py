@@ -2,4 +2,4 @@
 
 from actuator_lti.start.on_first_use import from_rooms
 
-__getattr__, __dir__ = from_rooms(__name__, describing="Cycle", run="Confirmation LimitCycles limit_cycles")
+__getattr__, __dir__ = from_rooms(__name__, describing="Cycle", run="CycleResult LimitCycles limit_cycles")

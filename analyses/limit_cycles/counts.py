@@ -18,7 +18,7 @@ from actuator_lti.loops import Loops
 from actuator_lti.types import Floats
 from analyses.large_signal.tones import full_range, settled_ticks, tone
 from analyses.limit_cycles import describing
-from analyses.limit_cycles.run import Confirmation, confirm
+from analyses.limit_cycles.run import CycleResult, confirm
 from analyses.linear.loop_figures import loop_figures
 from analyses.linear.responses import response_at
 from analyses.motion.settling import settle
@@ -42,16 +42,16 @@ class Counts:
     sensor: Sensor
     quantum_rad: float  # one count, at the sensor's shaft
     standing_rad: float  # error of the output that its own count may leave; the motor's leaves none
-    standing_seen_rad: float  # what a step ends with, less what it ends with without counts
+    standing_simulated_rad: float  # what a step ends with, less what it ends with without counts
     speed_step_rad_s: float | None  # by which a speed made of counts jumps (motor side), if it is
     ripple_rad_s: float  # largest (peak) that counts add to a constant speed of the motor; which
     ripple_at_rad_s: float
-    cycles: tuple[Confirmation, ...]  # foreseen limit cycles, each with what the simulator says of it
+    cycles: tuple[CycleResult, ...]  # predicted limit cycles, each with what the simulator says of it
     linear_rad: float  # at the sensor, from which the gain of counts is 1 within 5 %, about any bias
     # Smallest amplitude tried from which the response to the command, at the bandwidth, is off by less than 5
     # % in the simulator: more, where counts shake the drive. ``None``: none up to 256 times as much, or the
     # drive is unstable without friction
-    linear_seen_rad: float | None
+    linear_simulated_rad: float | None
     off: Floats  # what that response is off by (relative) at `TRIED` times ``linear_rad``
 
 
@@ -96,13 +96,13 @@ def _counts(design: Design, loops: Loops, cause: describing.Cause) -> Counts:
         sensor=sensor,
         quantum_rad=quantum,
         standing_rad=quantum if sensor == "output" else 0.0,
-        standing_seen_rad=abs(counted - smooth),
+        standing_simulated_rad=abs(counted - smooth),
         speed_step_rad_s=quantum * to_motor / _span_s(design) if made_of else None,  # q/(m T)
         ripple_rad_s=ripple,
         ripple_at_rad_s=at,
         cycles=tuple(confirm(design, one) for one in describing.cycles_of_quantisation(design, (cause,))),
         linear_rad=linear,
-        linear_seen_rad=float(TRIED[good][0]) * linear_ratio() * quantum if good.any() else None,
+        linear_simulated_rad=float(TRIED[good][0]) * linear_ratio() * quantum if good.any() else None,
         off=off,
     )
 

@@ -6,7 +6,8 @@ Play: the torque's fundamental is that of the coupling with k and c times ``n(x)
 sqrt(1 - x^2))``, x = b/A. Dry friction: the slope ``4 Tc/(pi W)``, W the amplitude of its speed; none of
 breakaway, at which a sinusoid spends no time, and in cycles of play none by load. Quantisation: an angle that
 swings about the edge of a count is a relay, ``2 q/(pi A)`` up to A = q; the loop of its sensor (the motor's:
-of the speed made of it) has the cycle at the gain g that brings it to its border: ``A = 2 q/(pi g)``, stable.
+of the speed made of it) has the cycle at the gain g that brings it to its stability limit:
+``A = 2 q/(pi g)``, stable.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -52,7 +53,7 @@ class Cycle:
     output_rad: float  # amplitude of the output, peak
     inner_rad: float  # what the nonlinearity sees: twist, sensor's angle, motor's speed (rad/s)
     frequency_hz: float
-    stable: bool  # whether motion near it comes nearer; ``False``: the border between dying out and growing
+    stable: bool  # whether motion near it comes nearer; ``False``: the limit between dying out and growing
     state: dict[str, complex]  # its shape by state of the loop, at this amplitude
     load_Nm: float = 0.0  # load torque that it is at
 
@@ -102,7 +103,7 @@ def _cycle(
 
 
 def at_load(cycle: Cycle, design: Design, load_Nm: float) -> Cycle:
-    """The same cycle at another load torque: the slope at the border is the same, so W goes with Tc."""
+    """The same cycle at another load torque: the critical slope is the same, so W goes with Tc."""
     ratio = dry_Nm(design, load_Nm) / dry_Nm(design, cycle.load_Nm)
     return replace(
         cycle,
@@ -233,17 +234,17 @@ def cycles_of_quantisation(design: Design, causes: Iterable[Cause] = tuple(SENSO
     for cause in causes:
         if not counts_matter(design, cause):
             continue
-        border = _border_at_output(free) if cause == "quantisation" else _border_of_speed(free)
-        if border is not None:
-            gain, mode = border
+        critical_gain = _limit_at_output(free) if cause == "quantisation" else _limit_of_speed(free)
+        if critical_gain is not None:
+            gain, mode = critical_gain
             amplitude = 2.0 * (quantum_of(design, cause) or 0.0) / (pi * gain)
             seen = output_of(free, mode.shape) if cause == "quantisation" else mode.shape["th"]
             found.append(_cycle(cause, free, mode, amplitude, seen, friction=False, stable=True))
     return tuple(found)
 
 
-def _border_at_output(free: Design) -> tuple[float, Mode] | None:
-    """Gain of a sensor at the output that brings the loop to its border, and the oscillation there.
+def _limit_at_output(free: Design) -> tuple[float, Mode] | None:
+    """Gain of a sensor at the output that brings the loop to its stability limit, and the oscillation there.
 
     A speed made of that angle too makes the loop that at the velocity controller's output.
     """
@@ -251,17 +252,17 @@ def _border_at_output(free: Design) -> tuple[float, Mode] | None:
     velocity = control.velocity
     if velocity is not None and velocity.sensor == "output" and free.encoder.speed != "ideal":
         point = "u" if control.current is None else "i_ref"
-    border = exact_margins(assemble_loops(free), point, 0.0).gain_upper
-    if not np.isfinite(border):  # none, or the linear loop is unstable
+    critical_gain = exact_margins(assemble_loops(free), point, 0.0).gain_upper
+    if not np.isfinite(critical_gain):  # none, or the linear loop is unstable
         return None
     blocks = point_blocks(wire(free, Operating()), point)
-    ticks = [block.A - border * block.B @ block.C for block in blocks]
-    mode = _oscillation(ticks, blocks[0].states, free, at_border=True)
-    return None if mode is None else (border, mode)
+    ticks = [block.A - critical_gain * block.B @ block.C for block in blocks]
+    mode = _oscillation(ticks, blocks[0].states, free, at_limit=True)
+    return None if mode is None else (critical_gain, mode)
 
 
-def _border_of_speed(free: Design) -> tuple[float, Mode] | None:
-    """Gain of a speed made of the motor's angle, linear in a tick, that brings the loop to its border."""
+def _limit_of_speed(free: Design) -> tuple[float, Mode] | None:
+    """Gain of a speed made of the motor's angle, linear in a tick, that brings the loop to its limit."""
     velocity = free.controller.velocity
     assert velocity is not None
     programs = []
@@ -283,7 +284,7 @@ def _border_of_speed(free: Design) -> tuple[float, Mode] | None:
 
 
 def _oscillation(
-    ticks: Sequence[np.ndarray], states: Sequence[str], design: Design, *, at_border: bool = False
+    ticks: Sequence[np.ndarray], states: Sequence[str], design: Design, *, at_limit: bool = False
 ) -> Mode | None:
     """The largest eigenvalue of ticks that turns, or that nearest to the unit circle; None without any."""
     values, vectors = np.linalg.eig(reduce(lambda A, tick: tick @ A, ticks))
@@ -291,7 +292,7 @@ def _oscillation(
     if not turning.size:
         return None
     size = np.abs(values[turning])
-    k = int(turning[np.argmin(np.abs(size - 1.0)) if at_border else np.argmax(size)])
+    k = int(turning[np.argmin(np.abs(size - 1.0)) if at_limit else np.argmax(size)])
     period = wire(design, Operating()).period_s("position")
     frequency = float(np.angle(values[k])) / (2.0 * pi * period)
     shape = dict(zip(states, map(complex, vectors[:, k]), strict=True))

@@ -28,7 +28,7 @@ _STARTS = {**PLACES, **ELASTIC}
 
 
 @dataclass(frozen=True)
-class Confirmation:
+class CycleResult:
     """A predicted cycle against the simulator, started in its shape at several sizes."""
 
     cycle: describing.Cycle
@@ -53,14 +53,14 @@ class LimitCycles:
     """Cycles of one design."""
 
     design: Design
-    confirmations: tuple[Confirmation, ...]  # every predicted cycle
-    rests: tuple[Settling, ...]  # steps of several sizes, with every load, waited for
+    cycles: tuple[CycleResult, ...]  # every predicted cycle
+    settlings: tuple[Settling, ...]  # of steps of several sizes, with every load
     looked_for: tuple[str, ...]  # the causes that the design has
 
     @property
     def hunting(self) -> Settling | None:
         """The largest motion of a step of the drive as it is that does not come to rest; None: all do."""
-        return noticed(self.design, self.rests)
+        return noticed(self.design, self.settlings)
 
     @property
     def verdict(self) -> Verdict:
@@ -93,12 +93,12 @@ def limit_cycles(design: AnyDesign) -> LimitCycles:
     return LimitCycles(design, confirmed, settlings_of(design), looked_for)
 
 
-def confirm(design: Design, cycle: describing.Cycle) -> Confirmation:
+def confirm(design: Design, cycle: describing.Cycle) -> CycleResult:
     """Start in the cycle's shape at many sizes; find the nearest at which motion begins to grow or die."""
     tried = _tried(design, cycle)
     period = 1.0 / (cycle.frequency_hz * design.controller.period_s)  # ticks
     if CYCLES_WATCHED * period * len(SCALES) > BATCH_TICKS.most:
-        return Confirmation(cycle, None, None, tried=False)
+        return CycleResult(cycle, None, None, tried=False)
     rows = Rows.of(tried, len(SCALES), friction_on=cycle.with_friction, limits_on=False)
     rows["load"] = cycle.load_Nm
     # Half a count below the edge, as the mean of the sensor is; a speed made of counts has no mean: the motor
@@ -110,7 +110,7 @@ def confirm(design: Design, cycle: describing.Cycle) -> Confirmation:
     rows["speed_command_start"] = SCALES * _speed_command(tried, cycle)
     turn = _turn(rows, cycle, period)
     if turn is None:
-        return Confirmation(cycle, None, None)
+        return CycleResult(cycle, None, None)
     row, ratio = rows.take(turn), float(np.sqrt(SCALES[turn] * SCALES[turn + 1]))
     row["ticks"] = (CYCLES_WATCHED // 3 if cycle.stable else 1) * round(3.0 * period)
     row["record_every"] = max(int(period) // MOMENTS, 1)
@@ -120,7 +120,7 @@ def confirm(design: Design, cycle: describing.Cycle) -> Confirmation:
     up = np.flatnonzero((w[:-1] < 0.0) & (w[1:] >= 0.0))
     rising = t[up] - w[up] * (t[up + 1] - t[up]) / (w[up + 1] - w[up])
     hertz = float((len(up) - 1) / (rising[-1] - rising[0])) if len(up) > 1 else None
-    return Confirmation(cycle, ratio, hertz)
+    return CycleResult(cycle, ratio, hertz)
 
 
 def _turn(rows: Rows, cycle: describing.Cycle, period: float) -> int | None:
@@ -152,8 +152,10 @@ def _turn(rows: Rows, cycle: describing.Cycle, period: float) -> int | None:
 
 def _ends(_: Rows, drives: Sequence[Running], window: int, count: int) -> Floats:
     """Half the span of the output in what motions end in, followed for no more than so many ticks of work."""
-    rests = [judge(drive, count * window) for drive in drives]
-    return np.array([np.inf if one is None or one.verdict == "diverging" else one.amplitude for one in rests])
+    settlings = [judge(drive, count * window) for drive in drives]
+    return np.array(
+        [np.inf if one is None or one.verdict == "diverging" else one.amplitude for one in settlings]
+    )
 
 
 def _sizes(rows: Rows, drives: Sequence[Running], window: int, count: int) -> Floats:

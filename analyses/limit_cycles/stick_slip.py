@@ -107,11 +107,11 @@ def stick_slip_cycle(design: Design, load_Nm: float, loops: Loops | None = None)
 def _alone(design: Design, load_Nm: float) -> bool:
     """Whether one dry friction, the same both ways, is all that is not linear in the drive."""
     friction, coupling, behind = design.friction, design.coupling, design.load.friction
-    alike = friction.dry_torque_reverse_Nm is None and friction.viscous_reverse_Nms_rad is None
+    symmetric = friction.dry_torque_reverse_Nm is None and friction.viscous_reverse_Nms_rad is None
     rubs = friction.law == "coulomb" and not friction.points and friction.dry_Nm(load_Nm) > 0.0
     dry_behind = behind is not None and behind.dry_torque_Nm > 0.0
     beyond = coupling is not None and (coupling.play_rad or friction.load_coefficient or dry_behind)
-    return alike and rubs and not beyond and straight(design) == design
+    return symmetric and rubs and not beyond and straight(design) == design
 
 
 def _slip(design: Design, load_Nm: float, loops: Loops | None) -> _Slip | None:

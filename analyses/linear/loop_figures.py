@@ -4,7 +4,7 @@ A load whose moment grows with its own deflection (a pendulum upright, a fin ahe
 moves away by itself, and so does a rotor whose friction falls with the speed, or on a spring that the sampled
 form holds over a tick. A current loop alone, or a P velocity loop alone, does not stop that; the loops around
 them do. Such a loop is unstable in itself and no fault of the drive: it is judged with the rotor locked
-(current loop), or with the load's moment held (velocity loop).
+(current loop), or with the load's torque held (velocity loop).
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ from actuator_lti.step import StepFigures, step_figures
 from actuator_lti.systems.as_control import as_control
 from analyses.isolation import attempt
 
-HELD = {"current": "rotor locked", "velocity": "load moment held"}
+HELD = {"current": "rotor locked", "velocity": "load torque held"}
 """How an inner loop is judged that is unstable by itself, by its name."""
 OPEN = {"current": "outer loops open and rotor free", "velocity": "outer loops open"}  # how it stands then
 AWAY = "the load, cogging or falling friction drives it away"
@@ -40,7 +40,7 @@ ACTIVE = "held over a tick, as here and in the simulator, a slope over the angle
 
 
 def held_loop(loops: Loops, name: str) -> Loop:
-    """The inner loop with the rotor locked, or with the load's moment held."""
+    """The inner loop with the rotor locked, or with the load's torque held."""
     at = loops.operating
     held = replace(at, rotor="locked") if name == "current" else replace(at, torques_held=True)
     return loops_at(loops.design, held, loops.form, loops.inner_loops).present[name]
@@ -101,7 +101,7 @@ class LoopFigures:
         return f"{OPEN[self.loop.name]}, as {ACTIVE if self.by_hold else AWAY}"
 
     @property
-    def sound(self) -> bool | None:
+    def is_stable(self) -> bool | None:
         """Whether the loop, as it is judged, is stable; ``None`` where that is not known."""
         return self.judged.margins.stable
 
@@ -131,16 +131,16 @@ def loop_figures(
     Raises `InputError`, `NumericalError`: if the margins cannot be found; another figure that cannot becomes
     a note.
     """
-    answers = response, loop.plain_answer, loop.plain_closed
-    response = next(one for one in answers if one is not None)
+    responses = response, loop.plain_command_response, loop.plain_closed
+    response = next(one for one in responses if one is not None)
     margins = stability_margins(loop.plain_open, certify=certify)
     if margins.stable is not True:
         return LoopFigures(loop, response, margins, None, None, None)
     bare = LoopFigures(loop, response, margins, None, peaks(loop.plain_open), None)
-    return _answering(bare, response, mean, bandwidth=bandwidth, step=step)
+    return _responding(bare, response, mean, bandwidth=bandwidth, step=step)
 
 
-def _answering(
+def _responding(
     figures: LoopFigures, response: Any, mean: CommandMean | None, *, bandwidth: bool = True, step: bool
 ) -> LoopFigures:
     """The same with bandwidth and step of a response, behind the mean of the command where there is one."""
@@ -202,9 +202,9 @@ def all_loop_figures(
             else:
                 result[name] = loop_figures(loop, step=step, certify=certify)
             if name == "velocity" and result[name].stable:
-                result[name] = _with_speed_told(loops.design, result[name])
+                result[name] = _noting_speed(loops.design, result[name])
             if name == "current" and result[name].stable:
-                result[name] = _with_feedforward_told(loops.design, result[name])
+                result[name] = _noting_feedforward(loops.design, result[name])
             if name == "current" and wanted:
                 own = partial(_locked, loops, step=step, certify=certify)
                 with_it = own() if needed else attempt("current loop with the rotor locked", own, None)
@@ -218,7 +218,7 @@ def all_loop_figures(
     for name, one in result.items():
         lost = whole and one.margins.stable is False
         if lost or (certify and locked):
-            one = _with_hold_told(loops, one)
+            one = _noting_hold(loops, one)
         if lost and (one.by_hold or pushes_away(loops.design, loops.operating)):  # else its own fault
             kept = partial(loop_figures, held_loop(loops, name), step=step, certify=certify)
             held = one.locked or _if_there_is(kept, [])
@@ -227,7 +227,7 @@ def all_loop_figures(
     return result
 
 
-def _with_speed_told(design: Design, figures: LoopFigures) -> LoopFigures:
+def _noting_speed(design: Design, figures: LoopFigures) -> LoopFigures:
     """The same of an outermost velocity loop with a note where its measured speed is not the speed itself."""
     encoder, velocity = design.encoder, design.controller.velocity
     if velocity is None or design.controller.outermost != "velocity":
@@ -238,7 +238,7 @@ def _with_speed_told(design: Design, figures: LoopFigures) -> LoopFigures:
     return replace(figures, notes=(*figures.notes, note))
 
 
-def _with_feedforward_told(design: Design, figures: LoopFigures) -> LoopFigures:
+def _noting_feedforward(design: Design, figures: LoopFigures) -> LoopFigures:
     """The same of a current loop with a note on the feed-forward that its closed loop is without."""
     current = design.controller.current
     if current is None or current.resistance_feedforward == 0.0 or not figures.of_feedback:
@@ -251,12 +251,12 @@ def _with_feedforward_told(design: Design, figures: LoopFigures) -> LoopFigures:
 MATTERS = 0.01  # of a margin
 
 
-def _with_hold_told(loops: Loops, figures: LoopFigures) -> LoopFigures:
+def _noting_hold(loops: Loops, figures: LoopFigures) -> LoopFigures:
     """The same with a note where the drive's own torques, held over a tick (model.md section 6), matter."""
     if loops.tick_system is None:
         return figures
     name, plant = figures.loop.name, loops.tick_system.program.drive.plant
-    acting = [word for word, own in (("cogging", plant.torque), ("load torque", plant.moment)) if own]
+    acting = [word for word, own in (("cogging", plant.torque), ("load torque", plant.load_torque)) if own]
     if not acting:
         return figures
     motor = wire(loops.design, replace(loops.operating, torques_at_once=True))
@@ -299,6 +299,6 @@ def _position(loops: Loops, loop: Loop, *, step: bool, certify: bool) -> LoopFig
     if filtered:
         bare = replace(design, command=replace(design.command, filter_time_s=0.0))
         response = other_loops(loops, bare).plain_response
-    reference = _answering(figures, response, None, step=step)
+    reference = _responding(figures, response, None, step=step)
     said = (profile_note(design),) if mean else ()
     return replace(figures, reference=reference, notes=(*figures.notes, *said))

@@ -138,9 +138,11 @@ def survey_loops(design: AnyDesign, progress: Progress = None) -> LoopSurvey:
     tell(4, 6)
     budgets = attempt("delay budgets", lambda: _budgets(design, sampled), {})
     tell(5, 6)
-    border = attempt("limit of linear validity", lambda: _onset(loops, sampled), None)
+    linear_limit = attempt("limit of linear validity", lambda: _onset(loops, sampled), None)
     tell(6, 6)
-    return LoopSurvey(design, loops, forms, cuts, points, budgets, border, tuple(dict.fromkeys(refused)))
+    return LoopSurvey(
+        design, loops, forms, cuts, points, budgets, linear_limit, tuple(dict.fromkeys(refused))
+    )
 
 
 def _other_form(design: Design, form: Form, refused: list[str]) -> Mapping[str, LoopFigures]:
@@ -235,27 +237,27 @@ def _onset(loops: Loops, figures: Mapping[str, LoopFigures]) -> Onset | None:
     crossover = min((m.frequency_rad_s for m in result.margins.phase_margins), default=100.0)
     nyquist = min(path.nyquist_rad_s for path in loops.limiters.values())
     high = min(crossover * 30.0, nyquist * (1.0 - 1e-9))
-    border = with_cogging(loops, onset(loops, np.geomspace(crossover / 100.0, high, 160)))
-    return border if np.isfinite(border.amplitude_rad).any() else None
+    linear_limit = with_cogging(loops, onset(loops, np.geomspace(crossover / 100.0, high, 160)))
+    return linear_limit if np.isfinite(linear_limit.amplitude_rad).any() else None
 
 
 COGGING_PART = 0.1
 """Of a period of the cogging, peak: its spring is 5 % softer there, 2 J1(x)/x of x = 0.2 pi."""
 
 
-def with_cogging(loops: Loops, border: Onset) -> Onset:
-    """The border with ``"cogging"``: the linear loop has the spring that the cogging is at the motor's angle.
+def with_cogging(loops: Loops, linear_limit: Onset) -> Onset:
+    """The limit with ``"cogging"``: the linear loop has the spring that the cogging is at the motor's angle.
 
     Its line is where a sine turns the motor by `COGGING_PART` of a period.
     """
     design, response = loops.design, loops.plain_response
     outermost = design.controller.outermost
     if response is None or design.motor.cogging_Nm == 0.0 or outermost != "position":
-        return border
-    s = 1j * border.omega_rad_s
+        return linear_limit
+    s = 1j * linear_limit.omega_rad_s
     turned = np.abs(response(np.exp(s * response.dt))) * design.total_ratio
     own = COGGING_PART * 2.0 * np.pi / design.motor.cogging_periods / turned
-    first = own < border.amplitude_rad
-    active = tuple("cogging" if of else name for of, name in zip(first, border.active, strict=True))
-    lowest = np.minimum(own, border.amplitude_rad)
-    return Onset(border.omega_rad_s, lowest, active, {**border.each_rad, "cogging": own})
+    first = own < linear_limit.amplitude_rad
+    active = tuple("cogging" if of else name for of, name in zip(first, linear_limit.active, strict=True))
+    lowest = np.minimum(own, linear_limit.amplitude_rad)
+    return Onset(linear_limit.omega_rad_s, lowest, active, {**linear_limit.each_rad, "cogging": own})

@@ -51,7 +51,7 @@ def curve(system: Any, omega_rad_s: np.ndarray) -> Curve:
     return Curve(omega_rad_s, values, phase - 360.0 * _turns(omega_rad_s, values, phase))
 
 
-def answer_curve(figures: LoopFigures, omega_rad_s: np.ndarray) -> Curve:
+def response_curve(figures: LoopFigures, omega_rad_s: np.ndarray) -> Curve:
     """Evaluate what bandwidth and step of a loop are taken of, the mean of the command included."""
     own, mean = curve(figures.plain_response, omega_rad_s), figures.mean
     if mean is None:

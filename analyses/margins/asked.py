@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
-from actuator_lti.start.border import asked
+from actuator_lti.start.public_arguments import asked
 from analyses.request import LOAD, POINT, Option
 
 

@@ -124,8 +124,8 @@ def measured_over(loops: Loops, source: Any, place: str = "", averages: int | No
     if loop.period_s is not None:
         below = read.frequency_hz < 0.5 / loop.period_s
     if np.count_nonzero(below) < 2:
-        told = f"no two frequencies below half that of the sampling of the {name} loop"
-        raise InputError(f"{read.name}: {told}")
+        reason = f"no two frequencies below half that of the sampling of the {name} loop"
+        raise InputError(f"{read.name}: {reason}")
     omega, values = 2.0 * np.pi * read.frequency_hz[below], read.response[below]
 
     def model_at(omega: np.ndarray) -> np.ndarray:
@@ -188,8 +188,10 @@ class Margins:
     @property
     def verdict(self) -> Verdict:
         """The requirements, and that every loop is stable."""
-        sound = Tally.of(Verdict.of(one.sound) for one in (*self.loops.values(), *self.around.values()))
-        return (tally(self.requirements) + sound).verdict
+        is_stable = Tally.of(
+            Verdict.of(one.is_stable) for one in (*self.loops.values(), *self.around.values())
+        )
+        return (tally(self.requirements) + is_stable).verdict
 
     @property
     def passed(self) -> bool:
@@ -244,9 +246,9 @@ def as_judged(design: Design, asked: Asked) -> bool:
 
 def _by_cogging(loops: Loops, figures: Mapping[str, LoopFigures]) -> tuple[str, ...]:
     """Unstable loops that are stable without cogging, which at angle 0 drives the rotor away."""
-    motor, lost = loops.design.motor, [name for name, one in figures.items() if one.sound is False]
+    motor, lost = loops.design.motor, [name for name, one in figures.items() if one.is_stable is False]
     if not lost or float(motor.over_angle.slope_at(0.0)) <= 0.0:
         return ()
     even = other_loops(loops, replace(loops.design, motor=replace(motor, cogging_Nm=0.0)))
     without = all_loop_figures(even, step=False)
-    return tuple(name for name in lost if without[name].sound is True)
+    return tuple(name for name in lost if without[name].is_stable is True)

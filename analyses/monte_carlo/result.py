@@ -272,8 +272,8 @@ class MonteCarloResult:
     def verdict(self) -> Verdict:
         """That of all requirements, and of whether enough drives are stable."""
         most = 0.0 if self.at_least is None else 1.0 - self.at_least
-        told = None if self.unstable <= most < self.unstable + self.unresolved else self.unstable <= most
-        return (self.tally + Tally.of([Verdict.of(told)])).verdict
+        passed = None if self.unstable <= most < self.unstable + self.unresolved else self.unstable <= most
+        return (self.tally + Tally.of([Verdict.of(passed)])).verdict
 
     def case(self, odds: Odds) -> WorstCase | None:
         """The worst case of a requirement, where one was sought."""
@@ -288,8 +288,8 @@ class MonteCarloResult:
         """Whether a requirement is met: in every sample and the worst case, or as often as is enough."""
         case = self.case(odds)
         if self.at_least is None and (case is not None or odds.failed):
-            told = case.passed if case is not None and not odds.unresolved else None
-            return Verdict.of(False if odds.failed or (case and case.passed is False) else told)
+            passed = case.passed if case is not None and not odds.unresolved else None
+            return Verdict.of(False if odds.failed or (case and case.passed is False) else passed)
         proven, refuted = odds.low >= self.enough, odds.high < self.enough
         return Verdict.of(proven if proven or refuted else None)
 

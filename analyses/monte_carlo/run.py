@@ -21,8 +21,8 @@ from actuator_lti.drive.operating import OperatingPoint
 from actuator_lti.errors import InputError
 from actuator_lti.files.atomic import write_bytes
 from actuator_lti.loops import assemble_loops
-from actuator_lti.start.border import asked
 from actuator_lti.start.extras import need
+from actuator_lti.start.public_arguments import asked
 from actuator_lti.types import Progress
 from analyses.finite import finite
 from analyses.linear.loop_figures import all_loop_figures

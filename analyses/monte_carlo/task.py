@@ -24,7 +24,7 @@ from actuator_lti.drive.operating import OperatingPoint
 from actuator_lti.errors import InputError, finite_number
 from actuator_lti.files.atomic import write_bytes
 from actuator_lti.files.reading import Tree, read_json
-from actuator_lti.start.border import asked
+from actuator_lti.start.public_arguments import asked
 from analyses.monte_carlo.judging import drive_column, in_populations, loop_column, loop_columns, loops_of
 from analyses.studies.engine import Arrays, Chunk
 from analyses.studies.proof import code_version

@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Annotated
 
 from actuator_lti.errors import InputError
-from actuator_lti.start.border import asked
+from actuator_lti.start.public_arguments import asked
 from analyses.request import LOAD, Option
 
 KINDS = "step, ramp, sine, stepped-sine, chirp, triangle, multisine, hold, recorded"

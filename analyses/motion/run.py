@@ -15,7 +15,7 @@ from analyses.motion.asked import KINDS, USUAL_CYCLES, Asked
 from analyses.motion.settling import Conduct, conduct
 from nonlinear import Trajectory, commands, loads, simulate
 from nonlinear.commands import Command
-from nonlinear.loads import LoadMoment
+from nonlinear.loads import LoadTorque
 from nonlinear.runs.records import read_columns
 from nonlinear.runs.trajectory import COMMAND_UNITS
 
@@ -74,8 +74,8 @@ def motion(design: AnyDesign, asked: Asked, *, progress: Progress = None) -> Mot
     if asked.cycles is not None and asked.command != "stepped-sine":  # which has a duration of its own
         needed = asked.start + asked.cycles / asked.frequency
         if duration is not None and abs(duration - needed) > 1e-9 * needed:
-            told = f"--cycles {asked.cycles}, --duration {duration:g}: {asked.cycles} periods take"
-            raise InputError(told + f" {needed:g} s; allowed: one of the two options")
+            reason = f"--cycles {asked.cycles}, --duration {duration:g}: {asked.cycles} periods take"
+            raise InputError(reason + f" {needed:g} s; allowed: one of the two options")
         duration = needed
     command = _command(design, asked, USUAL_S if duration is None else duration, unit, 1.0 / per_SI)
     seconds = duration
@@ -83,11 +83,11 @@ def motion(design: AnyDesign, asked: Asked, *, progress: Progress = None) -> Mot
         tabled = command.kind in ("stepped_sine", "recorded", "sampled")
         seconds = command.end_s if tabled and 0.0 < command.end_s < float("inf") else USUAL_S
     elif command.kind == "stepped_sine" and 0.0 < seconds < command.end_s * (1.0 - 1e-9):
-        told = f"--duration {seconds:g}: the stepped sine takes {command.end_s:.6g} s;"
-        raise InputError(told + " allowed: that or more, or fewer --count or --cycles")
+        reason = f"--duration {seconds:g}: the stepped sine takes {command.end_s:.6g} s;"
+        raise InputError(reason + " allowed: that or more, or fewer --count or --cycles")
     if asked.start >= seconds > 0.0 and asked.start > 0.0:
-        told = f"the run ends at {seconds:g} s; allowed: less, or --duration"
-        raise InputError(f"--start {asked.start:g}: {told}")
+        reason = f"the run ends at {seconds:g} s; allowed: less, or --duration"
+        raise InputError(f"--start {asked.start:g}: {reason}")
     run = simulate(
         design,
         command,
@@ -138,7 +138,7 @@ def _command(design: Design, asked: Asked, duration: float, unit: str, scale: fl
     return simple[kind]()
 
 
-def _load(asked: Asked, duration: float) -> LoadMoment:
+def _load(asked: Asked, duration: float) -> LoadTorque:
     """The load; its file is on the clock of the record, whose first row is put at the start."""
     moment = loads.proportional(asked.load_slope, asked.load)
     if asked.load_file is None:

@@ -458,14 +458,15 @@ def _electrical_parts(design: Design, record: Record) -> dict[str, tuple[float, 
     u, i, w = (_smooth(record, values) for values in (record["voltage"], record["current"], speed))
     if motor.inductance_H is not None:  # of a direct drive as large as the rest
         u = u - motor.inductance_H * np.gradient(i, record.period_s)
-    u, i, w = (_thinned(record, values[_inner(record)]) for values in (u, i, w))
+    u, i, w, late = (_thinned(record, one[_inner(record)]) for one in (u, i, w, np.gradient(w)))
     parts = np.column_stack([ohm * i, back * w])
     size, total = np.linalg.norm(parts, axis=0), parts.sum(axis=1)
     if len(u) < LEAST_ROWS or not np.any(total):
         return {}
     if np.all(size > 0.03 * np.linalg.norm(u)) and np.linalg.cond(parts / size) < 100.0:
         r, e = parts.T
-        return {"R i": _bounds(u, r, e, e), "kE w": _bounds(u, e, r, r)}
+        moved = np.column_stack([e, late])  # a filtered speed lacks what goes with the current's torque
+        return {"R i": _bounds(u, r, moved, moved), "kE w": _bounds(u, e, r, r)}
     return {"R i + kE w": _bounds(u, total, np.gradient(total), np.gradient(u))}
 
 

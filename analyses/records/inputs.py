@@ -106,7 +106,8 @@ def spec_of_names(
     first, *others = times or [""]
     why |= dict.fromkeys(others, f"the time is read from {first}")
     if not first or not signals:
-        return None, why
+        lacks = "no column of the time; allowed: one such as time_s, or time.period_s in a record file"
+        return None, ({"time": lacks} if signals else {}) | why
     time = TimeColumn(column=first, unit=taken_apart(_own_name(first)).unit or "s")
     return RecordSpec(format=layout or CsvFormat(), time=time, signals=tuple(signals.values())), why
 

@@ -40,7 +40,7 @@ class Move:
 def mending(point: WeakPoint, survey: LoopSurvey, corners: Corners | None = None) -> Move | None:
     """Find the least move of one gain that brings every margin of the weakest view within its limit.
 
-    And those of every other view that is not stable: at the border it would be no better.
+    And those of every other view that is not stable: at the stability limit it would be no better.
     No other view of a loop goes beyond its limits, or further beyond them, and no requirement on a loop that
     is met is lost. ``None`` where no single gain within the factor `SPAN` does, or the view is no loop of
     `linear_figures`.
@@ -108,7 +108,8 @@ def _reserves(same: Sequence[View], design: Design, path: str, values: np.ndarra
     at = {"operating_point": same[0].kind, "load_Nm": same[0].load_Nm}
     try:
         population = Population(same[0].design or design, {path: values}, len(values))
-        found = linear_figures(population, **at, time_figures=False, held=True)
+        loops = {view.loop for view in same}
+        found = linear_figures(population, **at, time_figures=False, held=True, loops=loops)
     except InputError:
         return np.full((len(same), len(values)), -inf)
     return np.array([_least(found, view, design) for view in same])

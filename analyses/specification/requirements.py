@@ -156,8 +156,8 @@ def judged(
     """Judge one requirement wherever it holds; ``asked``: by a name what an analysis finds, or why not."""
     quantity = QUANTITIES.get(requirement.quantity)
     if quantity is None:
-        told = f"quantity = {requirement.quantity!r}: allowed are {', '.join(QUANTITIES)}"
-        raise InputError(f"requirement {requirement.id}: {told}", where=design.origin or None)
+        reason = f"quantity = {requirement.quantity!r}: allowed are {', '.join(QUANTITIES)}"
+        raise InputError(f"requirement {requirement.id}: {reason}", where=design.origin or None)
     if quantity.scope == "analysis":
         value, reason = asked(quantity.name)
         verdicts = [_verdict(requirement, None, value, reason or NOT_STATED * (value is None))]
@@ -194,8 +194,8 @@ def _judge_loop(
     """Judge one requirement on one loop; an unstable loop meets none."""
     rotor = requirement.rotor or (found.rotor if found else "") if name == "current" else ""
     if name not in LOOPS:
-        told = f"loop = {name!r}: allowed are {', '.join(LOOPS)}, every"
-        raise InputError(f"requirement {requirement.id}: {told}", where=design.origin or None)
+        reason = f"loop = {name!r}: allowed are {', '.join(LOOPS)}, every"
+        raise InputError(f"requirement {requirement.id}: {reason}", where=design.origin or None)
     if found is None:
         return _verdict(requirement, name, None, f"the design has no {name} loop", rotor)
     result = found.asked(requirement)

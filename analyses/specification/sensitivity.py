@@ -78,7 +78,7 @@ def sensitivities(design: Design, paths: Sequence[str] | None = None) -> Sensiti
 
 
 def _rise(low: float, high: float) -> float:
-    """High less low; 0 where both are the same infinity (a stiffness that no moment overcomes)."""
+    """High less low; 0 where both are the same infinity (a stiffness that no load overcomes)."""
     return 0.0 if low == high else float(high - low)
 
 

@@ -3,5 +3,5 @@
 from actuator_lti.start.on_first_use import from_rooms
 
 _RESULTS = "AtRest Check LostMotion Stiffness StiffnessCurve "
-_QUESTIONS = "check_stiffness lost_motion_seen stiffness stiffness_at_rest stiffness_curves"
+_QUESTIONS = "check_stiffness lost_motion_simulated stiffness stiffness_at_rest stiffness_curves"
 __getattr__, __dir__ = from_rooms(__name__, run=_RESULTS + _QUESTIONS)

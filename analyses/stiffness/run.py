@@ -50,11 +50,11 @@ class StiffnessCurve:
 
 @dataclass(frozen=True)
 class LostMotion:
-    """How far the output is apart under a small moment to either side, the motor held; at least the play."""
+    """How far apart a small load torque moves the output, the motor held; at least the play."""
 
     play_rad: float  # the play of the coupling at the output
-    foreseen_rad: float  # at +-3 % of the largest load moment (`actuator_lti.loops.stiffness`)
-    seen_rad: float | None = None  # the same in the simulator; None where it was not asked
+    predicted_rad: float  # at +-3 % of the largest load torque (`actuator_lti.loops.stiffness`)
+    simulated_rad: float | None = None  # the same in the simulator; None where it was not asked
 
 
 @dataclass(frozen=True)
@@ -62,28 +62,28 @@ class Check:
     """One frequency by the simulator's own derivative, without play; both inf where nothing moves."""
 
     frequency_hz: float
-    foreseen_Nm_rad: complex
-    seen_Nm_rad: complex
+    predicted_Nm_rad: complex
+    simulated_Nm_rad: complex
     way: OperatingPoint = "sliding"
 
     @property
     def difference(self) -> float:
         """Relative difference of the two compliances."""
-        if np.isinf(self.foreseen_Nm_rad):
-            return 0.0 if np.isinf(self.seen_Nm_rad) else np.inf
-        return abs(self.foreseen_Nm_rad / self.seen_Nm_rad - 1.0)
+        if np.isinf(self.predicted_Nm_rad):
+            return 0.0 if np.isinf(self.simulated_Nm_rad) else np.inf
+        return abs(self.predicted_Nm_rad / self.simulated_Nm_rad - 1.0)
 
 
 @dataclass(frozen=True)
 class AtRest:
-    """Fundamental stiffness of the drive as it is, at rest, to a sinusoidal moment.
+    """Fundamental stiffness of the drive as it is, at rest, to a sinusoidal load torque.
 
     inf: no motion; NaN: none that comes again in the next period, as of a drive that hunts.
     """
 
     moment_Nm: float
     frequency_hz: float
-    seen_Nm_rad: complex
+    simulated_Nm_rad: complex
 
 
 @dataclass(frozen=True)
@@ -101,7 +101,11 @@ class Stiffness:
     def lost_motion_difference(self) -> float | None:
         """Relative difference of lost motion as predicted and as simulated; None where it was not read."""
         lost = self.lost_motion
-        return None if lost is None or lost.seen_rad is None else abs(lost.seen_rad / lost.foreseen_rad - 1.0)
+        return (
+            None
+            if lost is None or lost.simulated_rad is None
+            else abs(lost.simulated_rad / lost.predicted_rad - 1.0)
+        )
 
     @cached_property
     def requirements(self) -> tuple[RequirementVerdict, ...]:
@@ -139,7 +143,7 @@ def check_stiffness(design: Design, frequencies_hz: Sequence[float]) -> tuple[Ch
     """The simulator's own derivative from the load to the output (`nonlinear.tangent`) beside the loops.
 
     Without play and counts; at rest without dry friction or, where friction has other slopes in motion,
-    creeping with it.  An output that no moment moves is pushed with the largest load moment.
+    creeping with it.  An output that no load torque moves is pushed with the largest load torque.
 
     Raises `UnstableError`: for a loop that is not stable.
     """
@@ -158,11 +162,11 @@ def _checked(bench: Design, way: OperatingPoint, hertz: npt.NDArray[np.float64])
         raise UnstableError(f"stiffness: the closed loop is not stable{at_load}")
     if not response.moves:
         pushed = stiffness_at_rest(bench, [(each, bench.load.moment_max_Nm or 1.0) for each in hertz])
-        return tuple(Check(one.frequency_hz, complex(np.inf), one.seen_Nm_rad, way) for one in pushed)
+        return tuple(Check(one.frequency_hz, complex(np.inf), one.simulated_Nm_rad, way) for one in pushed)
     own = tangent(bench, "load", setup=LoopSetup(bench, "load", motion, limits_on=False))
-    seen = 1.0 / own.closed(np.exp(2j * np.pi * hertz * own.hold_s))
-    foreseen = linear.stiffness_at(response, hertz)
-    found = zip(hertz.tolist(), foreseen.tolist(), seen.tolist(), strict=True)
+    simulated = 1.0 / own.closed(np.exp(2j * np.pi * hertz * own.hold_s))
+    predicted = linear.stiffness_at(response, hertz)
+    found = zip(hertz.tolist(), predicted.tolist(), simulated.tolist(), strict=True)
     return tuple(Check(*each, way) for each in found)
 
 
@@ -171,7 +175,7 @@ def _ways(design: Design) -> list[OperatingPoint]:
 
 
 def stiffness_at_rest(design: Design, asked: Sequence[tuple[float, float]]) -> tuple[AtRest, ...]:
-    """Fundamental stiffness of the drive as it is, command held, at (frequency in Hz, moment in N m)."""
+    """Fundamental stiffness of the drive as it is, command held, at (frequency in Hz, torque in N m)."""
     made, period, every = [], design.controller.period_s, design.controller.position_loop.every
     settling = settling_ticks_of(design, LEFT)
     for frequency, amplitude in asked:
@@ -181,21 +185,21 @@ def stiffness_at_rest(design: Design, asked: Sequence[tuple[float, float]]) -> t
         moment = np.tile(-amplitude * turn.imag, skipped + 2)
         run = simulate(design, commands.hold(), count * period, series(np.arange(count) * period, moment))
         both = (moment, run.output_angle_rad - run.output_angle_rad[-1])  # at rest: 0 to the last digit
-        given, seen = (signal[skipped * ticks :].reshape(2, ticks) @ turn for signal in both)
-        K = complex(given.sum() / seen.sum()) if seen.any() else complex(np.inf)
-        if abs(seen[1] - seen[0]) > STEADY * abs(seen).max():
+        torque, angle = (signal[skipped * ticks :].reshape(2, ticks) @ turn for signal in both)
+        K = complex(torque.sum() / angle.sum()) if angle.any() else complex(np.inf)
+        if abs(angle[1] - angle[0]) > STEADY * abs(angle).max():
             K = complex(np.nan)
         made.append(AtRest(amplitude, 1.0 / (ticks * period), K))
     return tuple(made)
 
 
-def lost_motion_seen(design: Design) -> float:
-    """Lost motion in the simulator, the rotor held: a slow moment goes to +`LOST_MOTION_SHARE`, then to -.
+def lost_motion_simulated(design: Design) -> float:
+    """Lost motion in the simulator, the rotor held: a slow load goes to +`LOST_MOTION_SHARE`, then to -.
 
     The load is damped critically against the spring in place of its own friction, so that it lands behind the
-    play without a bounce; at both readings the moment stays until it has gone through the play.
+    play without a bounce; at both readings it stays until it has gone through the play.
 
-    Raises `InputError`: without a coupling, a position loop or a largest load moment.
+    Raises `InputError`: without a coupling, a position loop or a largest load torque.
     """
     coupling, rated = design.coupling, design.load.moment_max_Nm
     if coupling is None or design.controller.position is None or rated <= 0.0:
@@ -224,30 +228,32 @@ def lost_motion_seen(design: Design) -> float:
 STATES: tuple[State, ...] = ("powered", "shorted", "open")
 CHECKED_HZ = (2.0, 10.0, 50.0)
 REST_HZ = (2.0, 20.0)
-REST_FRACTIONS = (0.01, 0.1, 1.0)  # of the largest moment
+REST_FRACTIONS = (0.01, 0.1, 1.0)  # of the largest load torque
 
 
 def stiffness(design: AnyDesign, *, simulated: bool = True) -> Stiffness:
     """Dynamic and static stiffness and lost motion of a design.
 
-    ``simulated``: put them to the simulator, by a moment injected at three frequencies, and a slow one to
-    either side.
+    ``simulated``: put them to the simulator, by a load torque injected at three frequencies, and a slow one
+    to either side.
 
     Raises `InputError`: for a loop that is not stable.
     """
     design = as_design(design)
     held = design.controller.position is not None
     checks = check_stiffness(design, CHECKED_HZ) if simulated and held else ()
-    largest = design.load.moment_max_Nm if any(np.isfinite(one.foreseen_Nm_rad) for one in checks) else 0.0
+    largest = design.load.moment_max_Nm if any(np.isfinite(one.predicted_Nm_rad) for one in checks) else 0.0
     asked = [(f, share * largest) for f in REST_HZ for share in REST_FRACTIONS]
-    seen = stiffness_at_rest(design, asked) if largest > 0.0 else ()
+    at_rest = stiffness_at_rest(design, asked) if largest > 0.0 else ()
     unproven = "no position loop holds the output" if simulated and not checks else ""
     lost = None
     if design.coupling is not None:
         play = design.coupling.play_rad / design.ratio_behind_coupling
-        read = lost_motion_seen(design) if simulated and held and design.load.moment_max_Nm > 0.0 else None
+        read = (
+            lost_motion_simulated(design) if simulated and held and design.load.moment_max_Nm > 0.0 else None
+        )
         lost = LostMotion(play, linear.lost_motion_rad(design), read)
-    return Stiffness(design, stiffness_curves(design), lost, checks, seen, unproven)
+    return Stiffness(design, stiffness_curves(design), lost, checks, at_rest, unproven)
 
 
 def unpowered(design: Design, winding: State) -> Design:
@@ -282,10 +288,10 @@ def stiffness_curves(design: Design) -> tuple[StiffnessCurve, ...]:
     curves = []
     for load, state in product(_telling_loads(design), STATES):
         if state != "shorted" or design.motor.has_electrical_dynamics:
-            seen = design if state == "powered" else unpowered(design, state)
+            drive = design if state == "powered" else unpowered(design, state)
             for way in _ways(design)[0 if state == "powered" else -1 :]:
                 at = Operating(point=way, load_Nm=load, torques_at_once=state != "powered")
-                response = linear.compliance(seen, at)
+                response = linear.compliance(drive, at)
                 hertz = np.union1d(linear.frequencies_hz(response), linear.weakest_hz(response))
                 K, static = linear.stiffness_at(response, hertz), linear.static_stiffness(response)
                 curves.append(StiffnessCurve(state, hertz, K, static, load, way))

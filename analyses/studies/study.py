@@ -207,8 +207,8 @@ class _Maker:
         first = Variant(base.name, slug(base.name), base)
         for name, times in Counter(variant.name for variant in (first, *variants)).items():
             if times > 1:
-                told = f"variant.name = {shown(name)}: twice; allowed: names that differ"
-                raise InputError(told, where=root.origin)
+                reason = f"variant.name = {shown(name)}: twice; allowed: names that differ"
+                raise InputError(reason, where=root.origin)
         name = _name(root.table("study"), base.name if head.name is None else head.name)
         table, plan = root.table("monte_carlo"), None
         if "monte_carlo" in root:
@@ -267,8 +267,8 @@ class _Maker:
             design = with_overrides(start, overrides) if overrides else start
         except InputError as error:
             each = getattr(error, "mistakes", [error])
-            told = [one.message if one.where == where else str(one) for one in each]
-            refused = as_one([InputError(f"variant {shown(name)}: {one}", where=where) for one in told])
+            messages = [one.message if one.where == where else str(one) for one in each]
+            refused = as_one([InputError(f"variant {shown(name)}: {one}", where=where) for one in messages])
             if not self.keep_going:
                 raise refused from error
             return Variant(name, slug(name), None, overrides, str(refused))

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-from actuator_lti.start.border import asked
+from actuator_lti.start.public_arguments import asked
 from analyses.request import Option
 
 if TYPE_CHECKING:

@@ -199,9 +199,9 @@ def gain_requirements(design: Design, extra: tuple[Requirement, ...] = ()) -> tu
     every = asked_for(design, extra)
     chosen = tuple(r for r in every if r.quantity in moved and in_populations(r, design))
     if not chosen:
-        told = "no requirement on a loop: nothing to tune for; state margins and bandwidths in the "
-        told += 'file, or as --require "position.bandwidth>=30 Hz"'
-        raise InputError("; ".join(why_not_searched(every, design)) or told)
+        reason = "no requirement on a loop: nothing to tune for; state margins and bandwidths in the "
+        reason += 'file, or as --require "position.bandwidth>=30 Hz"'
+        raise InputError("; ".join(why_not_searched(every, design)) or reason)
     return chosen
 
 

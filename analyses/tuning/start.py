@@ -174,8 +174,8 @@ def checked(design: Design, wanted: Sequence[str]) -> tuple[Element, ...]:
         if control.velocity is None:
             raise InputError(f"place = {word}: the design {name} has no control.velocity to hold it")
         if word == "feedforward" and control.position is None:
-            told = f"the design {name} has no control.position, whose command it needs"
-            raise InputError(f"place = {word}: {told}")
+            reason = f"the design {name} has no control.position, whose command it needs"
+            raise InputError(f"place = {word}: {reason}")
     return tuple(item for item in ELEMENTS if item in wanted)
 
 

@@ -111,10 +111,10 @@ def agreed(run: Callable[[float], Numbers | None], setup: LoopSetup, enough: flo
     last: Numbers | None = None
     best: tuple[Numbers, float] | None = None
     for size in large * SIZES:
-        course = run(size)
+        motion = run(size)
         now = None
-        if course is not None and calm is not None and (course != calm).any():  # else lost in rounding
-            now = (course - calm) / size
+        if motion is not None and calm is not None and (motion != calm).any():  # else lost in rounding
+            now = (motion - calm) / size
         if now is not None and last is not None:
             off = float(np.max(np.abs(now - last)))
             if best is None or off < best[1]:
@@ -163,7 +163,7 @@ def _beside(bench: Bench, place: Place, gain: float, w: float) -> MarginRun:
     begins = complex(left @ right.real) / returned
     rows = _at_gain(setup, gain)
 
-    def course(size: float) -> Complexes | None:
+    def motion(size: float) -> Complexes | None:
         drive = rows.running()
         drive.s[t.places] += size / returned * right.real
         seen = []
@@ -173,7 +173,7 @@ def _beside(bench: Bench, place: Place, gain: float, w: float) -> MarginRun:
         return np.array(seen) if drive.happened == (0.0, 0.0) else None
 
     last = rate ** (count * stride)
-    seen, own = agreed(course, setup, WITHIN / SURE**2 * abs(begins) * last)
+    seen, own = agreed(motion, setup, WITHIN / SURE**2 * abs(begins) * last)
     amplitude = np.abs(np.concatenate([[1.0], seen / begins]))
     error = SURE * (own / abs(begins) / last + t.stated_error)
     time_s: Floats = stride * t.period_s * np.arange(count + 1.0)
@@ -232,7 +232,7 @@ def _found(setup: LoopSetup, place: Place, angle: float, samples: int) -> comple
     around = np.exp(1j * angle * updates) * np.eye(len(t.A)) - t.A
     begin = np.linalg.solve(around, t.B @ np.exp(1j * angle * np.arange(updates))).real
 
-    def course(size: float) -> Complexes | None:
+    def motion(size: float) -> Complexes | None:
         rows.sine(setup.point, size, angle / (2.0 * np.pi * t.hold_s), 0.5 * np.pi)
         drive = rows.running()
         drive.s[t.places] += size * begin
@@ -241,7 +241,7 @@ def _found(setup: LoopSetup, place: Place, angle: float, samples: int) -> comple
 
     size = abs(complex(t.closed(np.exp(1j * angle))))
     try:
-        closed = complex(agreed(course, setup, WITHIN / SURE**2 * size)[0][0])
+        closed = complex(agreed(motion, setup, WITHIN / SURE**2 * size)[0][0])
     except NumericalError:
         return complex(np.nan, np.nan)
     return closed / (1.0 - closed)

@@ -171,8 +171,8 @@ class Bench:
     def _path(self, name: str, loops: Loops) -> Callable[[Complexes], Complexes]:
         """Response of the output to command or load; its poles are those of the loops."""
         if name == "load":
-            assert loops.moment_system is not None
-            return loops.moment_system()
+            assert loops.load_torque_system is not None
+            return loops.load_torque_system()
         plain = loops.plain_response
         assert plain is not None
         # the reference of a speed drive is the motor's

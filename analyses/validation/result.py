@@ -63,7 +63,7 @@ class Validation:
     @property
     def unstable(self) -> tuple[str, ...]:
         """Loops that are not stable: as `analyses.margins` judges them, or where they are tested."""
-        judged = [name for name, own in self.loops.items() if own.sound is False]
+        judged = [name for name, own in self.loops.items() if own.is_stable is False]
         tested = [name for name, own in self.figures.items() if own.margins.stable is False]
         spared = {*self.held_by_friction, *self.held}
         return tuple(dict.fromkeys([*judged, *(name for name in tested if name not in spared)]))
@@ -77,7 +77,7 @@ class Validation:
     def undecided(self) -> tuple[str, ...]:
         """Loops of which the data do not tell whether they are stable."""
         doubts = [name for name, own in self.figures.items() if own.margins.stable is None]
-        doubts += [name for name, own in self.loops.items() if own.sound is None]
+        doubts += [name for name, own in self.loops.items() if own.is_stable is None]
         return tuple(dict.fromkeys(doubts))
 
     @property

@@ -215,5 +215,5 @@ class _Work:
 
 def _unproven(name: str, notes: list[str]) -> Row:
     """The row of a place at which nothing could be measured."""
-    told = [note for note in notes if f"at {name}:" in note] or ["it failed, see what is missing"]
-    return Row(name="response", loop=name, verdict=Verdict.NOT_PROVEN, because=told[-1])
+    because = [note for note in notes if f"at {name}:" in note] or ["it failed, see what is missing"]
+    return Row(name="response", loop=name, verdict=Verdict.NOT_PROVEN, because=because[-1])

@@ -27,8 +27,8 @@ def overload(p, s, i):
 
 def outer(p, s, io, th):
     """Update the outermost stage."""
-    if p[layout.RARE_COMMAND] > 0.0:
-        position.outer_rare(p, s, io, th)
+    if p[layout.HAS_FULL_COMMAND] > 0.0:
+        position.full_command(p, s, io, th)
         return
     N, y = p[layout.RATIO], th
     if p[blocks.PROBE_Y] > 0.0:
@@ -83,7 +83,7 @@ def velocity(p, s, io, w, th):
     measured = w
     if p[layout.OWN_MEASURES] > 0.0:
         measured = s[layout.S_MEASURED_SPEED]
-    elif p[layout.RARE_SPEED] > 0.0:
+    elif p[layout.HAS_MEASURED_SPEED] > 0.0:
         measured = blocks.measured_speed(p, s, io, w, th)
     s[layout.S_MEASURED_SPEED] = measured
     e = s[layout.S_SPEED_REFERENCE] - measured
@@ -91,7 +91,7 @@ def velocity(p, s, io, w, th):
     limit = s[layout.S_CURRENT_LIMIT] if cascaded else s[layout.S_VOLTAGE_LIMIT]
     if p[layout.OWN_STAGE] == layout.OWN_VELOCITY:
         out = own_velocity(p, s, io, th, measured, limit)
-    elif p[layout.RARE_VELOCITY] > 0.0:
+    elif p[layout.HAS_FULL_VELOCITY] > 0.0:
         out = torque_path(p, s, e, limit)
         if cascaded:
             out, flag = position.sloped(p, s, out, p[layout.VELOCITY_PERIOD])
@@ -109,7 +109,7 @@ def velocity(p, s, io, w, th):
         position.put_voltage(p, s, io, out)
 
 
-def current_rare(p, s, io, i, w, th):
+def full_current(p, s, io, i, w, th):
     """Current controller with feed-forward, another anti-windup or an overload limit; its output."""
     wanted = blocks.clamp(s[layout.S_CURRENT_REFERENCE], s[layout.S_CURRENT_LIMIT])
     fed = p[layout.BACK_EMF_FEEDFORWARD] != 0.0 and p[layout.OWN_MEASURES] <= 0.0
@@ -136,8 +136,8 @@ def current_rare(p, s, io, i, w, th):
 
 def current(p, s, io, i, w, th):
     """Update the current stage: every tick."""
-    if p[layout.RARE_CURRENT] > 0.0:
-        out = current_rare(p, s, io, i, w, th)
+    if p[layout.HAS_FULL_CURRENT] > 0.0:
+        out = full_current(p, s, io, i, w, th)
     else:
         e, step = s[layout.S_CURRENT_REFERENCE] - i, p[layout.CURRENT_INTEGRAL]
         before = s[layout.S_CURRENT_INTEGRATOR]
@@ -154,7 +154,7 @@ def control(p, s, io, i, w, th):
     due = p[layout.HAS_VELOCITY] <= 0.0 or s[layout.S_UNTIL_VELOCITY] <= 0.0
     if p[layout.OWN_MEASURES] > 0.0 and due:  # before the outermost stage, which takes it too
         s[layout.S_MEASURED_SPEED] = (
-            blocks.measured_speed(p, s, io, w, th) if p[layout.RARE_SPEED] > 0.0 else w
+            blocks.measured_speed(p, s, io, w, th) if p[layout.HAS_MEASURED_SPEED] > 0.0 else w
         )
     if s[layout.S_UNTIL_OUTER] <= 0.0:
         s[layout.S_UNTIL_OUTER] = p[layout.OUTER_EVERY]

@@ -15,7 +15,7 @@ KERNELS = True
 
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(10)
 NODES, WEIGHTS = 0.5 * (_NODES + 1.0), 0.5 * _WEIGHTS
-LEDGER = layout.S_ENERGY
+BALANCE = layout.S_ENERGY
 
 
 def pieces_of(p, at, t):
@@ -26,18 +26,18 @@ def pieces_of(p, at, t):
 
 
 def add_slip(p, s, reverse, u, T, Tb, angle, sum_i, sum_ii, sum_iw, sum_ww):
-    """Add to the ledger what the integrals of i, i^2, i w and w^2 over a slip of ``angle`` mean."""
+    """Add to the balance what the integrals of i, i^2, i w and w^2 over a slip of ``angle`` mean."""
     Cv = p[layout.VISCOUS_REVERSE] if reverse > 0 else p[layout.VISCOUS]
     if p[layout.SOURCE] > 0.0:
-        s[LEDGER + layout.ENERGY_INPUT] += p[layout.SOURCE_GAIN] * u * angle
+        s[BALANCE + layout.ENERGY_INPUT] += p[layout.SOURCE_GAIN] * u * angle
     else:
-        s[LEDGER + layout.ENERGY_INPUT] += u * sum_i
-        s[LEDGER + layout.ENERGY_COPPER] += p[layout.RESISTANCE] * sum_ii
-        s[LEDGER + layout.ENERGY_CONVERSION] += (p[layout.BACK_EMF] - p[layout.TORQUE_CONSTANT]) * sum_iw
-    s[LEDGER + layout.ENERGY_DRY] += (Tb - T) * angle
-    s[LEDGER + layout.ENERGY_VISCOUS] += Cv * sum_ww
-    s[LEDGER + layout.ENERGY_OFFSET] += p[layout.OFFSET] * angle
-    s[LEDGER + layout.ENERGY_LOAD] -= (Tb + p[layout.OFFSET]) * angle
+        s[BALANCE + layout.ENERGY_INPUT] += u * sum_i
+        s[BALANCE + layout.ENERGY_COPPER] += p[layout.RESISTANCE] * sum_ii
+        s[BALANCE + layout.ENERGY_CONVERSION] += (p[layout.BACK_EMF] - p[layout.TORQUE_CONSTANT]) * sum_iw
+    s[BALANCE + layout.ENERGY_DRY] += (Tb - T) * angle
+    s[BALANCE + layout.ENERGY_VISCOUS] += Cv * sum_ww
+    s[BALANCE + layout.ENERGY_OFFSET] += p[layout.OFFSET] * angle
+    s[BALANCE + layout.ENERGY_LOAD] -= (Tb + p[layout.OFFSET]) * angle
 
 
 def energy_slip(p, s, at, reverse, t, i, w, u, T, Tb):
@@ -129,5 +129,5 @@ def energy_stick(p, s, t, i, u):
     d = i - final
     one = -math.expm1(-rate * t) / rate
     two = -math.expm1(-2.0 * rate * t) / (2.0 * rate)
-    s[LEDGER + layout.ENERGY_INPUT] += u * (final * t + d * one)
-    s[LEDGER + layout.ENERGY_COPPER] += R * (final * final * t + 2.0 * final * d * one + d * d * two)
+    s[BALANCE + layout.ENERGY_INPUT] += u * (final * t + d * one)
+    s[BALANCE + layout.ENERGY_COPPER] += R * (final * final * t + 2.0 * final * d * one + d * d * two)

@@ -253,12 +253,12 @@ LENGTH = DECAY + 2  # of the two segments, s
     SMOOTH,  # 1: no dry friction and one viscous slope, so nothing happens at w = 0
     LOOK,  # 1: no short way over a segment: tanh law, elastic, or w' may turn twice within
     SPLIT,  # 1: the computing delay has a fraction of a tick
-    RARE_LOAD,  # 1: the load changes from tick to tick
-    RARE_SENSE,  # 1: instruments or the supply are modelled
-    RARE_COMMAND,  # 1: the outermost stage is more than the P loop of position
-    RARE_SPEED,  # 1: the measured speed is not w itself
-    RARE_VELOCITY,  # 1: the velocity controller is more than a PI with conditional integration
-    RARE_CURRENT,
+    HAS_CHANGING_LOAD,  # 1: the load changes from tick to tick
+    HAS_INSTRUMENTS,  # 1: instruments or the supply are modelled
+    HAS_FULL_COMMAND,  # 1: the outermost stage is more than the P loop of position
+    HAS_MEASURED_SPEED,  # 1: the measured speed is not w itself
+    HAS_FULL_VELOCITY,  # 1: the velocity controller is more than a PI with conditional integration
+    HAS_FULL_CURRENT,
     OWN_MEASURES,  # 1: the speed is measured for the law of one's own, before all stages
     PROBING,  # 1: there is a probe
     NOTING,  # 1: more than the usual outputs are to be noted
@@ -452,7 +452,7 @@ SIGNALS = (
 BASE_SIGNALS = 7
 ALL_SIGNALS = 15
 # columns of the history: the base signals, then the motor angle, then before and after of each active probe,
-# then output speed, twist and coupling torque of an elastic drive, then the load moment where it varies
+# then output speed, twist and coupling torque of an elastic drive, then the load torque where it varies
 HISTORY_ANGLE = 7
 HISTORY_PROBES = 8
 ELASTIC_COLUMNS = 3

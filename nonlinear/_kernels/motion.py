@@ -51,7 +51,7 @@ def put_load(p, s, moment, torque):
     s[layout.S_TORQUE] = p[layout.BACK_DRIVABLE] / p[layout.RATIO] * moment - p[layout.OFFSET] + torque
 
 
-def quick_slip(p, s, part, u, d):
+def fast_slip(p, s, part, u, d):
     """Slip over a segment by its precomputed transition; 0 where the speed might cross zero within."""
     i, w = s[layout.S_CURRENT], s[layout.S_SPEED]
     side = 1 if d < 0.0 else 0
@@ -71,7 +71,7 @@ def quick_slip(p, s, part, u, d):
     return 1
 
 
-def quick_stick(p, s, part, u):
+def fast_stick(p, s, part, u):
     """Rest over a whole segment; 0 where the rotor might break away within."""
     i, Tb = s[layout.S_CURRENT], s[layout.S_TORQUE]
     final = u * p[layout.LOCKED_GAIN]
@@ -87,17 +87,17 @@ def quick_stick(p, s, part, u):
     return 0
 
 
-def quick(p, s, part, u):
+def fast_path(p, s, part, u):
     """The short way over a segment in which nothing happens; 0 where it has to be looked at."""
     if p[layout.LOOK] > 0.0:
         return 0
     d = s[layout.S_DIRECTION]
     if d != 0.0:
-        return quick_slip(p, s, part, u, d)
-    return quick_stick(p, s, part, u)
+        return fast_slip(p, s, part, u, d)
+    return fast_stick(p, s, part, u)
 
 
-def closely(p, s, part, u, events):
+def event_path(p, s, part, u, events):
     """One segment by the general way; the events of this tick so far, -1 where there are too many."""
     if p[layout.ELASTIC_DRIVE] > 0.0:
         status = elastic_motion(p, s, part, u, s[layout.S_LOAD], s[layout.S_EXTRA])
@@ -125,7 +125,7 @@ def hold(p, s, io):
     for j in range(layout.S_QUEUE, last):
         s[j] = s[j + 1]
     s[last] = applied_voltage(p, s, io)
-    if p[layout.RARE_LOAD] > 0.0:
+    if p[layout.HAS_CHANGING_LOAD] > 0.0:
         io[layout.IO_MOMENT] = hinge_moment(p, s, io)
         put_load(p, s, io[layout.IO_MOMENT], shaft_torque(p, s, io))
 
@@ -135,8 +135,8 @@ def motion(p, s, io):
     hold(p, s, io)
     events = 0.0
     for part in range(0 if p[layout.SPLIT] > 0.0 else 1, 2):
-        if events >= 0.0 and quick(p, s, part, s[layout.S_QUEUE + part]) == 0:
-            events = closely(p, s, part, s[layout.S_QUEUE + part], events)
+        if events >= 0.0 and fast_path(p, s, part, s[layout.S_QUEUE + part]) == 0:
+            events = event_path(p, s, part, s[layout.S_QUEUE + part], events)
     s[layout.S_HELD] = s[layout.S_QUEUE + 1]
     if events != 0.0:
         count_events(s, events)

@@ -189,7 +189,7 @@ def own_position(p, s, io, reference, th):
     return out, flags
 
 
-def outer_rare(p, s, io, th):
+def full_command(p, s, io, th):
     """Update the outermost stage, whichever it is."""
     r = shape(p, s, io[layout.IN_COMMAND])
     if p[layout.HAS_POSITION] > 0.0 and p[layout.OWN_STAGE] == layout.OWN_POSITION:

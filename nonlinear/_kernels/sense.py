@@ -81,21 +81,21 @@ def supply(p, s):
     U, Us, Rs = s[layout.S_VOLTAGE_LIMIT], p[layout.SUPPLY_VOLTAGE], p[layout.SUPPLY_RESISTANCE]
     power, Ts = s[layout.S_VOLTAGE] * s[layout.S_CURRENT], p[layout.PERIOD]
     i_b = power / U if U > 0.0 else 0.0
-    ledger = layout.S_ENERGY
+    balance = layout.S_ENERGY
     if i_b >= 0.0 or p[layout.REGENERATIVE] > 0.0:
         s[layout.S_VOLTAGE_LIMIT] = max(Us - Rs * i_b, 0.0)
-        s[ledger + layout.ENERGY_SUPPLY] += Us * i_b * Ts
+        s[balance + layout.ENERGY_SUPPLY] += Us * i_b * Ts
         # the drop that the current of the last tick met; a bus above the source gives from its capacitor
         charged = Us < U and p[layout.REGENERATIVE] <= 0.0
         line = layout.ENERGY_CAPACITOR if charged else layout.ENERGY_SUPPLY_LOSS
-        s[ledger + line] += (Us - U) * i_b * Ts
+        s[balance + line] += (Us - U) * i_b * Ts
         return
     C = p[layout.CAPACITANCE]
     free = math.sqrt(max(U * U - 2.0 * power * Ts / C, 0.0))
     s[layout.S_VOLTAGE_LIMIT] = min(free, p[layout.BRAKE_VOLTAGE])
     after = s[layout.S_VOLTAGE_LIMIT]
-    s[ledger + layout.ENERGY_BRAKE] += 0.5 * C * (free - after) * (free + after)
-    s[ledger + layout.ENERGY_CAPACITOR] += 0.5 * C * (after - U) * (after + U)
+    s[balance + layout.ENERGY_BRAKE] += 0.5 * C * (free - after) * (free + after)
+    s[balance + layout.ENERGY_CAPACITOR] += 0.5 * C * (after - U) * (after + U)
 
 
 def applied_voltage(p, s, io):

@@ -6,7 +6,7 @@ from nonlinear._kernels import layout, tick
 from nonlinear._kernels.elastic_modes import find_mode
 from nonlinear._kernels.elastic_prepare import prepare_elastic, prepare_elastic_sizes
 from nonlinear._kernels.energy import prepare_forms
-from nonlinear._kernels.motion import closely, count_events, hold, put_load, quick
+from nonlinear._kernels.motion import count_events, event_path, fast_path, hold, put_load
 from nonlinear._kernels.sense import seed_streams
 from nonlinear._kernels.slipping import COMPLEX, describe, transition
 from nonlinear._kernels.smooth import prepare_tanh
@@ -66,21 +66,21 @@ def prepare_gates(p):
     more = max(more, any_of(p, layout.POSITION_INTEGRAL, layout.DERIVATIVE_COEFFICIENT))
     if p[layout.HAS_POSITION] <= 0.0 or p[layout.FEEDFORWARD] != 0.0:
         more = 1.0
-    p[layout.RARE_COMMAND] = max(more, any_of(p, layout.COMMAND_FILTERS, layout.SPEED_FILTERS))
+    p[layout.HAS_FULL_COMMAND] = max(more, any_of(p, layout.COMMAND_FILTERS, layout.SPEED_FILTERS))
     plain = p[layout.SPEED_SOURCE] <= 0.0 and p[layout.FILTER_COEFFICIENT] >= 1.0
-    p[layout.RARE_SPEED] = 0.0 if plain and p[layout.SPEED_FILTERS] <= 0.0 else 1.0
-    p[layout.RARE_SPEED] = max(p[layout.RARE_SPEED], p[layout.SPEED_SENSOR])
+    p[layout.HAS_MEASURED_SPEED] = 0.0 if plain and p[layout.SPEED_FILTERS] <= 0.0 else 1.0
+    p[layout.HAS_MEASURED_SPEED] = max(p[layout.HAS_MEASURED_SPEED], p[layout.SPEED_SENSOR])
     more = any_of(p, layout.ACCELERATION_FEEDFORWARD, layout.PROFILED)
     more = max(more, any_of(p, layout.TORQUE_FILTERS, layout.TRACKING_ANGLE))
-    p[layout.RARE_VELOCITY] = max(more, any_of(p, layout.VELOCITY_WINDUP, layout.VELOCITY_TRACKING))
+    p[layout.HAS_FULL_VELOCITY] = max(more, any_of(p, layout.VELOCITY_WINDUP, layout.VELOCITY_TRACKING))
     for j in range(layout.LIMITS, layout.OWN_A):
         if p[j] < math.inf:
-            p[layout.RARE_VELOCITY] = 1.0
+            p[layout.HAS_FULL_VELOCITY] = 1.0
     more = max(any_of(p, layout.BACK_EMF_FEEDFORWARD, layout.SUPPLY), p[layout.OVERLOAD])
-    p[layout.RARE_CURRENT] = max(more, any_of(p, layout.CURRENT_WINDUP, layout.CURRENT_TRACKING))
+    p[layout.HAS_FULL_CURRENT] = max(more, any_of(p, layout.CURRENT_WINDUP, layout.CURRENT_TRACKING))
     more = max(p[layout.SUPPLY], any_of(p, layout.OUTPUT_SENSOR, layout.POSITION_COUNTS))
-    p[layout.RARE_SENSE] = max(more, any_of(p, layout.CURRENT_RESOLUTION, layout.SEED))
-    p[layout.RARE_LOAD] = any_of(p, layout.LOAD_SLOPE, layout.SUPPLY_TABLE)
+    p[layout.HAS_INSTRUMENTS] = max(more, any_of(p, layout.CURRENT_RESOLUTION, layout.SEED))
+    p[layout.HAS_CHANGING_LOAD] = any_of(p, layout.LOAD_SLOPE, layout.SUPPLY_TABLE)
     p[layout.OWN_MEASURES] = 0.0
     if p[layout.OWN_STAGE] > 0.0:
         prepare_own(p)
@@ -89,13 +89,13 @@ def prepare_gates(p):
 def prepare_own(p):
     """What a law of one's own needs besides: its stage's longer form, the sensors, perhaps the speed."""
     stage = p[layout.OWN_STAGE]
-    p[layout.RARE_SENSE] = 1.0
+    p[layout.HAS_INSTRUMENTS] = 1.0
     if stage == layout.OWN_POSITION:
-        p[layout.RARE_COMMAND] = 1.0
+        p[layout.HAS_FULL_COMMAND] = 1.0
     elif stage == layout.OWN_VELOCITY:
-        p[layout.RARE_VELOCITY] = 1.0
+        p[layout.HAS_FULL_VELOCITY] = 1.0
     else:
-        p[layout.RARE_CURRENT] = 1.0
+        p[layout.HAS_FULL_CURRENT] = 1.0
     if p[layout.OWN_READS_SPEED] > 0.0 and (p[layout.HAS_VELOCITY] <= 0.0 or stage == layout.OWN_POSITION):
         p[layout.OWN_MEASURES] = 1.0
 
@@ -183,7 +183,7 @@ def part_of_tick(p, q, s, io, tau):
         if q[layout.LENGTH + part] > 0.0 and events >= 0.0:
             u = s[layout.S_QUEUE + part]
             s[layout.S_HELD] = u
-            if quick(q, s, part, u) == 0:
-                events = closely(q, s, part, u, events)
+            if fast_path(q, s, part, u) == 0:
+                events = event_path(q, s, part, u, events)
     count_events(s, events)
     return int(s[layout.S_STATUS])

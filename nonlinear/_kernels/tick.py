@@ -97,7 +97,7 @@ def init_elastic(p, s):
 def decide(p, s, io):
     """Sense and control at t_k, and note what there is to record."""
     i, w, th = s[layout.S_CURRENT], s[layout.S_SPEED], s[layout.S_ANGLE]
-    if p[layout.RARE_SENSE] > 0.0:
+    if p[layout.HAS_INSTRUMENTS] > 0.0:
         sense(p, s, io)
         control(p, s, io, io[layout.IN_CURRENT], io[layout.IN_SPEED], io[layout.IN_ANGLE])
     else:

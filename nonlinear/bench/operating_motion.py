@@ -157,7 +157,7 @@ def on_its_stand(design: Design, like: Design | None = None) -> Design:
 def standing(design: Design) -> OperatingMotion:
     """At rest, motor at zero, no dry friction: a constant torque there holds it, and a constant moment.
 
-    A coupling carries the load's own moment at output angle 0; one with play is pressed where that does not
+    A coupling carries the load's own torque at output angle 0; one with play is pressed where that does not
     close it.  The drive is one that `may_stand`, `on_its_stand`.
     """
     coupling, torque, carried = design.coupling, holding_torque_Nm(design), holding_moment_Nm(design)

@@ -7,7 +7,7 @@ from typing import Literal
 import numpy as np
 
 from actuator_lti.errors import InputError, finite_number
-from actuator_lti.start.border import asked
+from actuator_lti.start.public_arguments import asked
 from actuator_lti.types import Floats
 from nonlinear._kernels import layout as at
 from nonlinear.commands import Command

@@ -4,7 +4,7 @@ Nothing here computes: `actuator_lti.compiled` translates `nonlinear._kernels`, 
 put names, units, parameters and interfaces around it.
 """
 
-from actuator_lti.start.border import guard
+from actuator_lti.start.public_arguments import guard
 from nonlinear.export.c_files import c_export
 from nonlinear.export.controller import controller_export
 from nonlinear.export.fmu import PLATFORMS, fmu_bytes, refuse_unknown

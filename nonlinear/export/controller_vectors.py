@@ -99,7 +99,7 @@ def _all_places(struct: Struct, kind: Kind) -> npt.NDArray[np.intp]:
 def seen_by(p: Floats, s: Floats, io: Floats) -> Floats:
     """What the controller has seen at a tick: the instruments' values, or the state before it."""
     inputs = io.copy()
-    if p[at.RARE_SENSE] <= 0.0:
+    if p[at.HAS_INSTRUMENTS] <= 0.0:
         inputs[[at.IN_CURRENT, at.IN_SPEED, at.IN_ANGLE]] = s[[at.S_CURRENT, at.S_SPEED, at.S_ANGLE]]
     return inputs
 

@@ -52,7 +52,7 @@ def slope_at_zero(p, slope, waves, peak, order):
 
 
 def stiffness_at_zero(p):
-    """Stiffness of the spring's piece on which the load's own moment at angle zero leaves the drive."""
+    """Stiffness of the spring's piece on which the load's own torque at angle zero leaves the drive."""
     moment, k = 0.0, p[layout.STIFFNESS]
     for j in range(averaged(p), layout.MOMENT_WAVES):
         moment += p[layout.MOMENT_PEAK + j] * math.sin(p[layout.MOMENT_ORDER + 2 * j + 1])

@@ -24,14 +24,14 @@ _SHOWN = re.compile(r"\x01([^\x02]*)\x02([^\x03]*)\x03")
 
 @dataclass
 class _Way(Tape):
-    """One way through a check: the first outcomes of comparisons are told, the rest those of the values."""
+    """One way through a check: the first outcomes of comparisons are given, the rest those of the values."""
 
-    told: Sequence[bool] = ()
+    taken: Sequence[bool] = ()
     outcomes: list[bool] = field(default_factory=list)
 
     def condition(self, does: str, terms: tuple[Any, ...], outcome: bool) -> bool:
         number = len(self.outcomes)
-        self.outcomes.append(self.told[number] if number < len(self.told) else outcome)
+        self.outcomes.append(self.taken[number] if number < len(self.taken) else outcome)
         return super().condition(does, terms, self.outcomes[-1])
 
 
@@ -48,10 +48,10 @@ def relation_statements(design: Design, keys: Mapping[str, float]) -> list[tuple
 
 
 def _followed(
-    design: Design, keys: Mapping[str, float], check: Any, told: tuple[bool, ...], turns: int
+    design: Design, keys: Mapping[str, float], check: Any, taken: tuple[bool, ...], turns: int
 ) -> list[Statement]:
-    """What a check does behind the outcomes that are told, up to what it refuses first."""
-    way = _Way(loose=True, told=told)
+    """What a check does behind the outcomes given, up to what it refuses first."""
+    way = _Way(loose=True, taken=taken)
     end = Statement("allowed")
     try:
         for refusal in check(followed(design, keys, way)):
@@ -65,7 +65,7 @@ def _followed(
             rest.insert(0, statement)
             continue
         number -= 1
-        if number < len(told):  # that, and what lies before it, is there already
+        if number < len(taken):  # that, and what lies before it, is there already
             break
         turned = (*way.outcomes[:number], not way.outcomes[number])
         deep = turns > MOST_TURNS

@@ -131,7 +131,7 @@ def _friction(design: Design, row: Floats, friction_on: bool) -> None:
 
 
 def _load(design: Design, row: Floats) -> None:
-    """The drive's own moments and torques act in every run, told or not."""
+    """The drive's own torques and torques act in every run, told or not."""
     row[at.LOAD_DAMPING] = design.load.moment_damping_Nms_rad
     _over_angle(row, design.load.over_angle, at.LOAD_SLOPE, at.MOMENT_PEAK, at.MOMENT_ORDER)
     _over_angle(row, design.motor.over_angle, at.TORQUE_SLOPE, at.TORQUE_PEAK, at.TORQUE_ORDER)

@@ -12,12 +12,12 @@ from actuator_lti.bounds import RUN_TICKS
 from actuator_lti.design.loader import AnyDesign, as_design
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError, finite_number, positive_number, shown
-from actuator_lti.start.border import asked
+from actuator_lti.start.public_arguments import asked
 from actuator_lti.types import Compared, Floats
 from nonlinear._kernels import layout as at
 from nonlinear.bench.probe import Probe, write_probe
 from nonlinear.commands import Command, numbers_of, write
-from nonlinear.loads import LoadMoment, constant
+from nonlinear.loads import LoadTorque, constant
 from nonlinear.row.parameters import design_row
 from nonlinear.runs.trajectory import State
 
@@ -95,7 +95,7 @@ class Run:
     design: AnyDesign
     command: Command
     duration_s: float
-    load_Nm: float | LoadMoment = 0.0
+    load_Nm: float | LoadTorque = 0.0
     bias: Command | None = None
     probes: Sequence[Probe] = ()
     initial: State | None = None
@@ -165,9 +165,9 @@ def check_frequency(design: Design, command: Command) -> None:
         raise InputError(f"{message}: it would come back at a lower one; filter it first", where=design.name)
 
 
-def _put_load(row: Floats, given: float | LoadMoment, tables: Tables) -> None:
+def _put_load(row: Floats, given: float | LoadTorque, tables: Tables) -> None:
     """Write the load torque; a plain number is a constant one."""
-    load = given if isinstance(given, LoadMoment) else constant(given)
+    load = given if isinstance(given, LoadTorque) else constant(given)
     row[at.LOAD] = load.constant_Nm
     row[at.LOAD_SLOPE] += load.slope_Nm_rad
     if load.series is not None:

@@ -18,7 +18,7 @@ from actuator_lti.types import Floats, Progress
 from nonlinear._kernels import layout as at
 from nonlinear.bench.probe import Probe
 from nonlinear.commands import Command
-from nonlinear.loads import LoadMoment
+from nonlinear.loads import LoadTorque
 from nonlinear.native import parameters, resume
 from nonlinear.row.parameters import MAX_EVENTS_PER_TICK, TANH_TOLERANCE
 from nonlinear.runs.running import Running
@@ -34,7 +34,7 @@ def simulate(
     design: AnyDesign,
     command: Command,
     duration_s: float,
-    load_Nm: float | LoadMoment = 0.0,
+    load_Nm: float | LoadTorque = 0.0,
     *,
     bias: Command | None = None,
     probes: Sequence[Probe] = (),

@@ -17,8 +17,8 @@ from actuator_lti.drawing import draw
 from actuator_lti.errors import InputError
 from actuator_lti.files.atomic import write_stream
 from actuator_lti.files.reading import shown
-from actuator_lti.start.border import checks_arguments
 from actuator_lti.start.extras import need
+from actuator_lti.start.public_arguments import checks_arguments
 from actuator_lti.types import Compared, Floats
 from nonlinear._kernels import layout as at
 

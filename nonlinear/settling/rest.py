@@ -9,7 +9,7 @@ question is asked of the whole state, and the drive is followed until it is answ
   state is set forward to just before breakaway (`nonlinear.settling.drift`), and the drive is followed
   from there;
 - *limit cycle*: held by friction it breaks away a third time from one place in one direction, after equal
-  times and swings (to `ALIKE`): what follows from there is known, so it does so for ever.  Or of `PERIODS`
+  times and swings (to `EQUAL`): what follows from there is known, so it does so for ever.  Or of `PERIODS`
   swings or more the later half is as large as the earlier, of the motor, too, and an event, a limit or a
   sensor's counts are in it, as a linear drive has none.  (A load that nothing damps swings on, at any size,
   while the motor comes to rest: no cycle.)  Which one a drive ends in may depend on the step.  Or swings of
@@ -39,7 +39,7 @@ from nonlinear.settling import drift
 
 Verdict = Literal["at rest", "limit cycle", "still moving", "diverging"]
 
-PERIODS, ALIKE, PARTS = 8, 0.01, 8
+PERIODS, EQUAL, PARTS = 8, 0.01, 8
 MOST_WORK = 4_000_000  # ticks, and integration steps within them
 PIECE_TICKS = 4096
 PART_WORK = 4096  # ticks and steps after which the work is looked at, where ticks may take many steps
@@ -149,7 +149,7 @@ class _Watch:
         """What is seen in the last half of the entries; None: nothing that tells the end."""
         if self._faint(swing := self._swing()):
             return self._rest("at rest")
-        if swing.alike and self._bent() and self._motor_keeps_on():
+        if swing.equal and self._bent() and self._motor_keeps_on():
             return self._rest("limit cycle", swing)
         return self._rest("at rest") if self._idle() else None
 
@@ -214,7 +214,7 @@ class _Watch:
         if p[at.HAS_CURRENT] > 0.0 and p[at.HAS_VELOCITY] <= 0.0:
             return np.stack([columns[0], columns[3], columns[3]])
         if p[at.ELASTIC_DRIVE] > 0.0:
-            place = columns.shape[0] - at.ELASTIC_COLUMNS - int(p[at.RARE_LOAD] > 0.0)
+            place = columns.shape[0] - at.ELASTIC_COLUMNS - int(p[at.HAS_CHANGING_LOAD] > 0.0)
             return np.stack([columns[0], columns[place], w])
         return np.stack([columns[0], w, w])
 
@@ -267,14 +267,14 @@ class _Watch:
         for turns in range(1, (like.size - 1) // 2 + 1):
             each = like[2 * turns :: -turns]  # the breakaway that this is, a period ago, two
             (before, now), (first, middle, last) = np.diff(left[0, each]), left[1, each].astype(int)
-            if each[2] - each[1] != each[1] - each[0] or spans[turns] <= far or not _alike(before, now):
+            if each[2] - each[1] != each[1] - each[0] or spans[turns] <= far or not _equal(before, now):
                 continue
             moved = moved if moved.size else np.concatenate(self.seen, axis=1)[1:]
             span, seen = _span(moved[:, middle:last]), left[:, each[0] :]
-            if span > far and _alike(span, _span(moved[:, first:middle])):
+            if span > far and _equal(span, _span(moved[:, first:middle])):
                 n = next((n for n in range(1, each[2] - each[1] + 1) if _repeated(seen, n, span)), 0)
                 if n:
-                    return _Swing(2, (seen.shape[1] - 1) / n / (before + now), alike=True), middle
+                    return _Swing(2, (seen.shape[1] - 1) / n / (before + now), equal=True), middle
         return None
 
     def _spans_from(self, entries: Floats) -> Floats:
@@ -301,7 +301,7 @@ class _Watch:
         command, followed, _ = np.concatenate(self.seen, axis=1)
         missed = [float(part.max()) for part in np.array_split(np.abs(command - followed), PARTS)]
         limited = any(flags & ~at.FLAG_STICK for _, flags, _ in self._late())
-        grown = max(missed[-2:]) > (1.0 + ALIKE) * max(missed[:-2])
+        grown = max(missed[-2:]) > (1.0 + EQUAL) * max(missed[:-2])
         return grown and (limited or all(a < b for a, b in pairwise(missed[PARTS // 2 :])))
 
     def _goes_on(self) -> bool:
@@ -350,7 +350,7 @@ class _Watch:
     def _motor_keeps_on(self) -> bool:
         """Whether the motor swings in the last half of the entries, and as far at its end."""
         early, late = (float(np.ptp(part)) for part in np.array_split(self._half()[1][2], 2))
-        return early > 0.0 and _alike(early, late)
+        return early > 0.0 and _equal(early, late)
 
     def _late(self) -> list[tuple[int, int, int]]:
         left, result = sum(one[0] for one in self.acted) // 2, []
@@ -402,7 +402,7 @@ class _Watch:
 class _Swing:
     periods: int
     frequency_hz: float | None
-    alike: bool
+    equal: bool
 
 
 def _swing_of(times: Floats, values: Floats) -> _Swing:
@@ -413,16 +413,16 @@ def _swing_of(times: Floats, values: Floats) -> _Swing:
     up = places[1:][(side[places][1:] > 0) & (side[places][:-1] < 0)]
     n = max(up.size - 1, 0)
     if n < 2:
-        return _Swing(n, None, alike=False)
+        return _Swing(n, None, equal=False)
     sizes = np.array([np.ptp(values[a:b]) for a, b in pairwise(up)])
     first, second = (float(half.mean()) for half in np.array_split(sizes, 2))
-    alike = n >= PERIODS and _alike(first, second)
-    return _Swing(n, float(n / (times[up[-1]] - times[up[0]])), alike)
+    equal = n >= PERIODS and _equal(first, second)
+    return _Swing(n, float(n / (times[up[-1]] - times[up[0]])), equal)
 
 
-def _alike(first: float, second: float) -> bool:
+def _equal(first: float, second: float) -> bool:
     """Whether two swings, or their times, are as large as each other."""
-    return abs(second - first) <= ALIKE * first
+    return abs(second - first) <= EQUAL * first
 
 
 def _span(moved: Floats) -> float:
@@ -435,5 +435,5 @@ def _repeated(left: Floats, n: int, span: float) -> bool:
     periods = later[0] - earlier[0]
     places = np.abs(later[2:4] - earlier[2:4]).max()
     return bool(
-        (later[4] == earlier[4]).all() and np.ptp(periods) <= ALIKE * periods.max() and places <= ALIKE * span
+        (later[4] == earlier[4]).all() and np.ptp(periods) <= EQUAL * periods.max() and places <= EQUAL * span
     )

@@ -59,7 +59,7 @@ def refuse_undrawable(blocks: Sequence[Mapping[str, Any]], origin: str) -> None:
     for k, block in enumerate(blocks, 1):
         try:
             _, missing = caught(block["figure"], partial(draw_svg, block, "f", False))
-            why = missing.why.removeprefix("unforeseen ") if missing else ""
+            why = missing.why.removeprefix("unexpected ") if missing else ""
         except InputError as error:
             why = error.message
         if why:

@@ -64,9 +64,9 @@ def export(
     notes += [f"no place for it in {into}: {label}" for label in homeless]
     notes += ["XML has no place for that factor: import it with --velocity-gain-per rpm"] * unsaid
     if as_json:
-        told = {"objects": list(map(_plain, result.objects.values)), "notes": notes}
-        told["velocity_gain_factor"] = result.objects.velocity_gain_factor
-        print_json({"schema": "actuator-lti/objects", "version": 1, **told})
+        plain = {"objects": list(map(_plain, result.objects.values)), "notes": notes}
+        plain["velocity_gain_factor"] = result.objects.velocity_gain_factor
+        print_json({"schema": "actuator-lti/objects", "version": 1, **plain})
         return
     if out is None:
         print_line(text.rstrip())
@@ -107,8 +107,8 @@ def import_settings(
     write_new(out, text, force)
     if as_json:
         changed = {path: result.design.parameters[path].text for path in result.changed}
-        told = {"changed": changed, "kept": list(map(_plain, result.kept)), "notes": list(result.notes)}
-        print_json({"schema": "actuator-lti/objects-import", "version": 1, **told})
+        plain = {"changed": changed, "kept": list(map(_plain, result.kept)), "notes": list(result.notes)}
+        print_json({"schema": "actuator-lti/objects-import", "version": 1, **plain})
         return
     if out is None:
         print_line(text.rstrip())

@@ -120,7 +120,7 @@ def _tell(text: str) -> None:
 
 
 @contextmanager
-def told_if_slow(text: str, patience_s: float = 1.0) -> Iterator[None]:
+def note_if_slow(text: str, patience_s: float = 1.0) -> Iterator[None]:
     """Write a line to a terminal's standard error if the block is still at work after a while; once each."""
     timer = threading.Timer(patience_s, _tell, (text,))
     timer.daemon = True

@@ -17,7 +17,7 @@ BEFORE: style.Style = {"colour": style.MUTED, "width": 1.6, "dash": 1}
 PINNED = tuple(zip("ABC", style.SERIES[1:], strict=False))
 HERTZ = (1.0, 1000.0)
 FOLLOWED: style.Style = {"width": style.HALF, "loop": "live"}  # the loop whose figures share a cursor
-BORDERS = {one.words: COLOURS[name] for name, one in LIMITERS.items() if line_of(one) is not None}
+ONSETS = {one.words: COLOURS[name] for name, one in LIMITERS.items() if line_of(one) is not None}
 
 
 def live_charts(unit: str, axis: Axis = "rotary", *, electrical: bool = True) -> dict[str, str]:
@@ -36,7 +36,7 @@ def live_charts(unit: str, axis: Axis = "rotary", *, electrical: bool = True) ->
         "step": (_step(), f"Step response of the linear loop, {both}."),
         "difference": (difference, "Measured frequency response over the model as changed."),
         "run": (_run(unit, axis, electrical), f"Run with limits and friction, {both}, and a record."),
-        "border": (_border(unit), f"Command amplitude at which a limit is reached, {both}."),
+        "linear-limit": (_linear_limit(unit), f"Command amplitude at which a limit is reached, {both}."),
     }
     return {name: page_svg(made, f"live-{name}", words) for name, (made, words) in drawn.items()}
 
@@ -114,11 +114,11 @@ def _run(unit: str, axis: Axis, electrical: bool) -> Chart:
     return chart
 
 
-def _border(unit: str) -> Chart:
+def _linear_limit(unit: str) -> Chart:
     chart, panel = style.plot(265.0, y=f"command amplitude, {unit}", log="y", width=style.HALF)
     panel.curve(*EMPTY, "lowest, as designed", **BEFORE)
     panel.curve(*EMPTY, "lowest, as changed", **{**NOW, "width": 2.6})
-    for name, colour in BORDERS.items():
+    for name, colour in ONSETS.items():
         panel.curve(*EMPTY, name, colour=colour, width=1.1)
     style.frequency(panel, HERTZ)
     panel.y.limits(1e-3, 1e3)

@@ -24,7 +24,7 @@ from analyses.monte_carlo.judging import in_populations, loops_of
 from nonlinear.export import linear, page
 from nonlinear.export.c_files import exported_row
 from nonlinear.export.relations import relation_statements
-from reports.live.charts import BORDERS
+from reports.live.charts import ONSETS
 from reports.live.keys import Figure, followed
 from reports.live.text import patches
 from reports.sections.limits import COLOURS, WORDS
@@ -79,7 +79,7 @@ def live_model(design: Design, source: str | None = None) -> Tree:
         "apart": apart,
         "step": _step(design),
         "limits": [list(limit) for limit in page.limits_seen(design)],
-        "borders": list(BORDERS),
+        "onsets": list(ONSETS),
         "map": _map(design),
         "text": text,
         "patches": [list(place) for place in places],

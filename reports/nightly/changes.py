@@ -140,8 +140,8 @@ class Between:
         note = f"{skipped} night(s) without a result before; compared with the last that has one"
         found = self._compare(before, result, note * bool(skipped))
         shown = found.changes[:SHOWN_CHANGES]  # only what a page shows is looked at for going to and fro
-        courses = self.history.matrix(past[-WINDOW:], [c.figure for c in shown]).T.tolist()
-        marked = [replace(c, flapping=flaps(x, c.tolerance)) for c, x in zip(shown, courses, strict=True)]
+        histories = self.history.matrix(past[-WINDOW:], [c.figure for c in shown]).T.tolist()
+        marked = [replace(c, flapping=flaps(x, c.tolerance)) for c, x in zip(shown, histories, strict=True)]
         return replace(found, changes=(*marked, *found.changes[SHOWN_CHANGES:]))
 
     def baseline(self, result: Result, approval: Baseline | None) -> Comparison:

@@ -188,8 +188,8 @@ def open_history(state: Path) -> History:
     except ValidationError as error:
         raise InputError(f"is no history of a nightly build: {_REMEDY}", where=str(path)) from error
     if head.version > VERSION:
-        told = f"has version {head.version}, this actuator-lti knows up to {VERSION}: use a newer one"
-        raise InputError(told, where=str(path))
+        reason = f"has version {head.version}, this actuator-lti knows up to {VERSION}: use a newer one"
+        raise InputError(reason, where=str(path))
     sealed = _valid(_SEALED, data, path)
     if sha256(_INDEX.dump_json(sealed.index)) != sealed.sha256:
         raise _damaged(path, "is not what was written")

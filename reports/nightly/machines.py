@@ -126,6 +126,6 @@ def _value(value: float | None) -> str:
 def markdown(night: Overview) -> str:
     """Summary for a pull request: verdict first, then what fails, what changed and what is behind it."""
     notable = [d for d in night.designs if d.state != "pass" or d.last_night.changes]
-    told = {"told": changes, "states": STATES, "cell": markdown_cell, "or_none": or_none}
+    shown = {"differences": changes, "states": STATES, "cell": markdown_cell, "or_none": or_none}
     template = environment().get_template("nightly/summary.md.j2")
-    return template.render(night=night, notable=notable, listed=_LISTED, **told)
+    return template.render(night=night, notable=notable, listed=_LISTED, **shown)

@@ -106,8 +106,8 @@ def approve(
             raise InputError("no night has been finished here yet", where=str(site))
         last = history.runs[-1]
         for name in (name for name in names if history.first(name, [last]) is None):
-            told = f"{one_line(name, 80)!r} has no result in the last night: nothing to approve"
-            raise InputError(told, study.name)
+            why = f"{one_line(name, 80)!r} has no result in the last night: nothing to approve"
+            raise InputError(why, study.name)
         about = {"by": one_line(by, 200), "reason": one_line(reason, 2000)}
         history.approve(last.id, list(names) or None, at=clock(), **about)
         return site_files.publish(site, study, history, cache, keep_reports=use.keep)

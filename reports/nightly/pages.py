@@ -45,8 +45,8 @@ NIGHT_SIGNS = {
 
 def index(night: Overview, folder: str) -> str:
     """Make the page that stands at the root of the site; its links lead into ``folder``."""
-    told = {"headlines": changes.headlines(night.designs)[:MAX_HEADLINES], "STATE_ORDER": tuple(STATES)}
-    return _render("nightly/index.html", asset("nightly/nightly.js"), night=night, folder=folder, **told)
+    shown = {"headlines": changes.headlines(night.designs)[:MAX_HEADLINES], "STATE_ORDER": tuple(STATES)}
+    return _render("nightly/index.html", asset("nightly/nightly.js"), night=night, folder=folder, **shown)
 
 
 def of_night(night: Overview, history: History, available: set[str]) -> Iterator[tuple[str, str]]:
@@ -61,7 +61,7 @@ def of_night(night: Overview, history: History, available: set[str]) -> Iterator
 
 def design_page(night: Overview, design: DesignView, history: History, available: set[str]) -> str:
     past = history.results(design.name)
-    course = course_of(night, design, history, past)
+    trend = trend_of(night, design, history, past)
     known, states, rows = {r.run: r for r in past}, outcomes(past), list[Tree]()
     gaps = {night.runs[i].id: count for i, count in night.missing}
     for run in reversed(night.runs):
@@ -72,12 +72,12 @@ def design_page(night: Overview, design: DesignView, history: History, available
         result = known.get(run.id)
         folder = report_folder(result) if result is not None and result.key else ""
         row: Tree = {"gap": 0, "run": run, "result": result, "status": states.get(run.id, "absent")}
-        row |= {"moved": course.moved.get(run.id, 0), "marks": course.marks.get(run.id, [])}
+        row |= {"moved": trend.moved.get(run.id, 0), "marks": trend.marks.get(run.id, [])}
         approved = design.approval is not None and design.approval.run == run.id
         rows.append({**row, "report": folder if folder in available else "", "approved": approved})
     return _render(
-        "nightly/design.html", bundled("figures"), night=night, design=design, charts=course.charts,
-        steady=course.steady, nights=rows,
+        "nightly/design.html", bundled("figures"), night=night, design=design, charts=trend.charts,
+        steady=trend.steady, nights=rows,
         more_nights=max(0, len(past) - MAX_NIGHTS), max_changes=changes.SHOWN_CHANGES,
     )  # fmt: skip
 
@@ -85,7 +85,7 @@ def design_page(night: Overview, design: DesignView, history: History, available
 def _render(template: str, code: str, **context: Any) -> str:
     return render(
         template, style=asset("nightly/nightly.css"), code=code, states=STATES, night_signs=NIGHT_SIGNS,
-        told=changes, visible=visible, one_line=one_line, **context,
+        differences=changes, visible=visible, one_line=one_line, **context,
     )  # fmt: skip
 
 
@@ -93,7 +93,7 @@ def _render(template: str, code: str, **context: Any) -> str:
 
 
 @dataclass
-class Course:
+class Trend:
     """Charts for the page, figures without a change, change points and number of moves by night."""
 
     charts: list[Tree] = field(default_factory=list)
@@ -102,19 +102,19 @@ class Course:
     moved: dict[int, int] = field(default_factory=dict)
 
 
-def course_of(night: Overview, design: DesignView, history: History, past: Sequence[Result]) -> Course:
-    """Put together the course of a design.
+def trend_of(night: Overview, design: DesignView, history: History, past: Sequence[Result]) -> Trend:
+    """Put together the trend of a design.
 
     Requirements are always charted; margins and other figures with a better side only where they moved.
     """
     good = [i for i, result in enumerate(past) if result.home is not None]
     if not good:
-        return Course()
+        return Trend()
     figures = list(history.figures(past[good[-1]]).values())
     columns = Columns(figures, night.study.tolerances)
     values = history.matrix(past, columns.names)
     moved = columns.moved(values[good[:-1]], values[good[1:]]).sum(axis=1).tolist()
-    course = Course(moved={past[i].run: count for i, count in zip(good[1:], moved, strict=True)})
+    trend = Trend(moved={past[i].run: count for i, count in zip(good[1:], moved, strict=True)})
     size = np.max(np.abs(np.nan_to_num(values)), axis=0)
     allowed = columns.allowed(size, size).tolist()
     started = {run.id: run.started for run in night.runs}
@@ -124,31 +124,31 @@ def course_of(night: Overview, design: DesignView, history: History, past: Seque
         figure = figures[k]
         shown = figure.kind in ("requirement", "check") or (figure.better and figure.kind == "figure")
         if shown and np.isfinite(values[:, k]).any():
-            _add(course, figure, verdicts.get(figure.name, {}), nights, values[:, k], allowed[k])
+            _add(trend, figure, verdicts.get(figure.name, {}), nights, values[:, k], allowed[k])
         elif figure.kind == "requirement":
-            course.steady.append(figure)  # of a loop that was never stable, say
-    return course
+            trend.steady.append(figure)  # of a loop that was never stable, say
+    return trend
 
 
 def _add(
-    course: Course, figure: Figure, verdict: Tree, nights: Sequence[tuple[int, str]], values: np.ndarray,
+    trend: Trend, figure: Figure, verdict: Tree, nights: Sequence[tuple[int, str]], values: np.ndarray,
     tolerance: float,
 ) -> None:  # fmt: skip
     skipped = max(len(values) - LOOK_BACK, 0)
     points = [replace(p, index=skipped + p.index) for p in change_points(values[skipped:], tolerance)]
     to_and_fro = flaps(values.tolist(), tolerance)
-    moved = (points or to_and_fro) and len(course.charts) < MAX_CHARTS
+    moved = (points or to_and_fro) and len(trend.charts) < MAX_CHARTS
     if figure.kind != "requirement" and not moved:
-        course.steady.append(figure)
+        trend.steady.append(figure)
         return
     for point in points:
-        course.marks.setdefault(nights[point.index][0], []).append((figure, point))
+        trend.marks.setdefault(nights[point.index][0], []).append((figure, point))
     title, started = verdict.get("label", figure.name), [start for _, start in nights]
-    limit, prefix = verdict.get("bound"), f"t{len(course.charts)}"
+    limit, prefix = verdict.get("bound"), f"t{len(trend.charts)}"
     drawn = line_chart(title, figure.unit, started, values, points, limit, prefix)
     shown = [(started[p.index][:10], p) for p in points]
     about = {"title": title, "id": verdict.get("id", ""), "unit": figure.unit, "flaps": to_and_fro}
-    course.charts.append({**about, "svg": Markup(drawn), "points": shown})
+    trend.charts.append({**about, "svg": Markup(drawn), "points": shown})
 
 
 def line_chart(

@@ -61,8 +61,8 @@ def hold(state: Path, wait_s: float = 0.0) -> Iterator[None]:
         holder = "a process that has just started or ended"
         with suppress(OSError, ValueError, KeyError, TypeError):
             holder = "process {pid} on {host} since {since}".format(**json.loads(note.read_text("utf-8")))
-        told = f"another nightly holds the lock: {one_line(holder, 200)}; wait for it with --wait SECONDS"
-        raise InputError(told, where=str(state)) from error
+        reason = f"another nightly holds the lock: {one_line(holder, 200)}; wait for it with --wait SECONDS"
+        raise InputError(reason, where=str(state)) from error
     try:
         who = {"pid": os.getpid(), "host": socket.gethostname(), "since": now()}
         write_bytes(note, json.dumps(who).encode())

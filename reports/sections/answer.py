@@ -58,7 +58,7 @@ def section(
         "more": len(found) - min(len(apart), SHOWN),
     }
     failed = "not met" in [item["verdict"] for item in items] or "fail" in [one["severity"] for one in found]
-    status = "fail" if failed else worst_status([one.sound for one in figures.values()])
+    status = "fail" if failed else worst_status([one.is_stable for one in figures.values()])
     return doc.section("answer", "At a glance", [glance, *_pictures(figures, point)], status=status)
 
 

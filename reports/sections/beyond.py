@@ -9,7 +9,7 @@ import numpy as np
 from analyses.large_signal.conditional import Conditional, Prediction
 from analyses.large_signal.from_rest import RestSweep
 from analyses.limit_cycles.counts import WITHIN, Counts
-from analyses.limit_cycles.run import Confirmation
+from analyses.limit_cycles.run import CycleResult
 from reports import document as doc
 from reports.charts import style
 from reports.sections.limits import words_of
@@ -129,9 +129,9 @@ def _facts(one: Counts, axis: str) -> doc.Block:
         ("Ripple of the motor's speed, largest", one.ripple_rad_s, speed, 0),
         ("at a motor speed of", one.ripple_at_rad_s, speed, 0),
         ("Standing error of one count, without friction", one.standing_rad, out, -1),
-        ("what counts add to it after a step with friction", one.standing_seen_rad, out, -1),
+        ("what counts add to it after a step with friction", one.standing_simulated_rad, out, -1),
         (f"{within} from this amplitude at the sensor on, by describing function", one.linear_rad, out, 0),
-        ("Linear from this amplitude on, simulated at the bandwidth", one.linear_seen_rad, out, 0),
+        ("Linear from this amplitude on, simulated at the bandwidth", one.linear_simulated_rad, out, 0),
         ("Steps of the speed estimate", one.speed_step_rad_s, speed, 0),
     )
     return doc.facts(
@@ -141,7 +141,7 @@ def _facts(one: Counts, axis: str) -> doc.Block:
     )
 
 
-def _cycles(cycles: Sequence[tuple[Counts, Confirmation]], out: Unit) -> doc.Block:
+def _cycles(cycles: Sequence[tuple[Counts, CycleResult]], out: Unit) -> doc.Block:
     columns = [
         doc.of(lambda pair: NAMES[pair[0].sensor], "sensor", "Sensor"),
         doc.of(lambda pair: pair[1].cycle.inner_rad, "amplitude", "Amplitude at the sensor", **out.column()),

@@ -16,8 +16,7 @@ from analyses.specification.requirements import RequirementVerdict
 from analyses.validation.row import Row as Check
 from reports import document as doc
 from reports.as_json import as_json
-from reports.html import show_signed
-from reports.numbers import capital, row_unit, significant
+from reports.numbers import capital, row_unit, show_signed, significant
 from reports.sections import compare_best, compare_figures
 from reports.sections.compare_best import SEEN, number, unstable_words
 from reports.sections.names import LOOPS
@@ -42,7 +41,7 @@ def section(comparison: Comparison) -> list[doc.Section]:
     best = compare_best.section(shown)
     best["intro"] = f"{best['intro']} {compare_best.shown_words(shown)}".strip()
     made = [best, verdicts(shown), figures(shown), differences(shown)]
-    return [*made, *ledger(shown), compare_figures.overlays(shown), compare_figures.tornadoes(shown)]
+    return [*made, *predictions(shown), compare_figures.overlays(shown), compare_figures.tornadoes(shown)]
 
 
 def brief(comparison: Comparison) -> Brief:
@@ -239,7 +238,7 @@ def _moved_table(one: Compared, comparison: Comparison) -> doc.Block:
 ROUNDING = 1e-9  # of a value
 
 
-def ledger(comparison: Comparison) -> list[doc.Section]:
+def predictions(comparison: Comparison) -> list[doc.Section]:
     tested = [one for one in comparison.all if one.checks or one.untested]
     if not tested:
         return []
@@ -254,7 +253,7 @@ def ledger(comparison: Comparison) -> list[doc.Section]:
     blocks: list[doc.Block] = []
     for (loop, condition), wanted in tables.items():
         title = f"{loop_name(loop)}: {condition}"
-        blocks += _side_by_side(title, list(wanted.values()), heads, parts, _ledger_cell)
+        blocks += _side_by_side(title, list(wanted.values()), heads, parts, _prediction_cell)
     blocks += [doc.text(f"{one.variant.name}: not tested. {one.untested}") for one in tested if one.untested]
     tally = Tally.of(entry.verdict for one in comparison.everything.all for entry in one.checks)
     result = f"{tally.words('predictions')}."
@@ -263,10 +262,10 @@ def ledger(comparison: Comparison) -> list[doc.Section]:
         "prediction where it is more than rounding."
     )
     title = "Predictions and simulation"
-    return [doc.section("ledger", title, blocks, result=result, intro=intro, status=tally.role)]
+    return [doc.section("predictions", title, blocks, result=result, intro=intro, status=tally.role)]
 
 
-def _ledger_cell(one: Compared, wanted: Check) -> doc.Cell:
+def _prediction_cell(one: Compared, wanted: Check) -> doc.Cell:
     entry = next((each for each in one.checks if each.key == wanted.key), None)
     if entry is None:
         return None

@@ -131,10 +131,10 @@ def _best(comparison: Comparison) -> doc.Block:
         row = {"what": label(wanted), "limit": limit_words(wanted.requirement), "base": number(wanted.value)}
         if ranked:
             high, low = max(ranked, key=lambda r: r[0]), min(ranked, key=lambda r: r[0])
-            first, *alike = [name for _, name, shown in ranked if shown == high[2]]  # the base is first
+            first, *equal = [name for _, name, shown in ranked if shown == high[2]]  # the base is first
             same = low[2] == high[2]
-            best = first + f"; {len(alike)} alike" * bool(alike)
-            row |= {"best": "all alike" if same and alike else best, "value": high[2]}
+            best = first + f"; {len(equal)} equal" * bool(equal)
+            row |= {"best": "all equal" if same and equal else best, "value": high[2]}
             row["worst"] = "" if same else f"{low[1]}: {low[2] or 'not stable'}"
         rows.append(row)
     return doc.table("Best design of each requirement", columns, rows)

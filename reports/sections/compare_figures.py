@@ -7,7 +7,7 @@ import numpy as np
 
 from actuator_lti.asked.quantities import ANALYSIS_QUANTITIES, drive_cases, shown_unit
 from analyses.comparison.variants import Compared, Comparison
-from analyses.linear.responses import answer_curve, curve, frequency_grid
+from analyses.linear.responses import curve, frequency_grid, response_curve
 from analyses.specification.sensitivity import Sensitivity
 from reports import document as doc
 from reports.charts import style
@@ -46,7 +46,7 @@ def _bode(name: str, title: str, drawn: tuple[Compared, ...], closed: bool) -> l
     for one, result in known:
         own = frequency_grid(result, 140)
         grid = np.unique(np.concatenate([np.geomspace(lowest, own[0], 20), own]))
-        response = answer_curve(result, grid) if closed else curve(result.loop.plain_open, grid)
+        response = response_curve(result, grid) if closed else curve(result.loop.plain_open, grid)
         band = result.bandwidth if closed else None
         values = response.values / abs((band and band.dc_gain) or 1.0)  # in any unit it starts at 0 dB
         curves.append((one.variant.name[:60], replace(response, values=values)))

@@ -29,9 +29,11 @@ def section(result: Corners) -> doc.Section:
     blocks = [_summary_table(result)]
     if result.corners[0].figures:
         blocks += [doc.figure("corners", chart(result), caption, alt=alt), details]
-    told = doc.severity(result.verdict)
+    severity = doc.severity(result.verdict)
     words = summary(result)
-    return doc.section("corners", "Corners", blocks, result=words, intro=intro, status=told, told=told)
+    return doc.section(
+        "corners", "Corners", blocks, result=words, intro=intro, status=severity, severity=severity
+    )
 
 
 def summary(result: Corners) -> str:
@@ -55,7 +57,7 @@ def summary(result: Corners) -> str:
 
 
 def _failings(corner: Corner) -> list[str]:
-    doubts = {name: one.sound for name, one in corner.figures.items() if not one.sound}
+    doubts = {name: one.is_stable for name, one in corner.figures.items() if not one.is_stable}
     known = {None: "not known to be stable", False: "not stable"}
     loops = [f"{name} loop {known[stable]}" for name, stable in doubts.items()]
     refused = [f"{key} not allowed there" for key in corner.refused]
@@ -64,7 +66,7 @@ def _failings(corner: Corner) -> list[str]:
 
 def worst(corner: Corner, quantity: Quantity) -> tuple[float, str] | None:
     """The worst of a figure over the loops, and its loop; None where there is none."""
-    read = [(quantity.read(one.judged), name) for name, one in corner.figures.items() if one.sound]
+    read = [(quantity.read(one.judged), name) for name, one in corner.figures.items() if one.is_stable]
     found = [(value, name) for value, name in read if value is not None]
     return min(found, key=lambda each: quantity.better * each[0], default=None)
 
@@ -80,11 +82,11 @@ def chart(result: Corners) -> style.Chart:
                 panel.rule_x(start, colour=style.SERIES[k], dash=2)
             for row, corner in enumerate(result.corners):
                 one = corner.figures[name]
-                value = shown(quantity, one.judged) if one.sound else None
+                value = shown(quantity, one.judged) if one.is_stable else None
                 at = row + 0.22 * (k - (len(nominal.figures) - 1) / 2.0)
                 look: style.Style = {"colour": style.SERIES[k], "read": False}
                 panel.curve([start, value], [at, at], width=2.4, **look)
-                if not one.sound and start is not None:
+                if not one.is_stable and start is not None:
                     panel.note("not stable", (start, at), colour=style.RED, pinned=True)
                 panel.points([value], [at], loop_words(name, one.rotor), **look | {"read": True})
         asked = [one.requirement for one in nominal.verdicts if one.requirement.quantity == quantity.name]
@@ -125,7 +127,7 @@ def _loop_table(result: Corners) -> doc.Block:
     columns = [
         doc.of(lambda pair: pair[0].name, "corner", "Corner"),
         doc.of(lambda pair: loop_words(pair[1].loop.name, pair[1].rotor), "loop", "Loop"),
-        doc.of(lambda pair: pair[1].sound is True, "stable", "Stable", format="yesno"),
+        doc.of(lambda pair: pair[1].is_stable is True, "stable", "Stable", format="yesno"),
         *map(figure, PER_LOOP),
     ]
     loops = [(corner, one) for corner in result.corners for one in corner.figures.values()]

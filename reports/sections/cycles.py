@@ -23,23 +23,25 @@ def section(result: LimitCycles) -> doc.Section:
     )
     causes = " or ".join(CAUSES[name] for name in result.looked_for) or "play or a quantised output sensor"
     none = doc.text(f"No limit cycle of {causes} is predicted.")
-    predicted = _predicted(result, fine) if result.confirmations else none
-    told = doc.severity(result.verdict)
+    predicted = _predicted(result, fine) if result.cycles else none
+    severity = doc.severity(result.verdict)
     blocks, words = [predicted, _rests(result, fine)], summary(result)
-    return doc.section("cycles", "Limit cycles", blocks, result=words, intro=intro, status=told, told=told)
+    return doc.section(
+        "cycles", "Limit cycles", blocks, result=words, intro=intro, status=severity, severity=severity
+    )
 
 
 def summary(result: LimitCycles) -> str:
     fine = fine_unit(result.design.axis)
-    swing, count = result.hunting, len(result.confirmations)
-    seen = sum(one.verdict == "confirmed" for one in result.confirmations)
+    swing, count = result.hunting, len(result.cycles)
+    seen = sum(one.verdict == "confirmed" for one in result.cycles)
     tail = "; no cycle is predicted"
     if count:
         tail = f"; {seen} of {count} predicted cycles confirmed" + ", the simulation decides" * (seen < count)
     if swing is None:
-        left = [one for one in result.rests if one.hunting]  # too small, or not long enough
+        left = [one for one in result.settlings if one.hunting]  # too small, or not long enough
         ends = [f"after {fine.of(one.amplitude_rad)} it {settling.words(one.rest, *fine)}" for one in left]
-        faint = [one for one in result.rests if not one.hunting and one.swing_rad]
+        faint = [one for one in result.settlings if not one.hunting and one.swing_rad]
         if faint:
             largest = max(faint, key=lambda one: one.swing_rad)
             ends.append(f"for {settling.faint_words(largest.rest, *fine)}")
@@ -71,9 +73,9 @@ def _predicted(result: LimitCycles, fine: Unit) -> doc.Block:
         "out or by its own describing function, as the column says; no limit acts. Confirmed: amplitude and "
         f"frequency are both within a factor of {AS_PREDICTED:g} of the predicted."
     )
-    if not all(one.tried for one in result.confirmations):
+    if not all(one.tried for one in result.cycles):
         note += f" Not tried: {CYCLES_WATCHED} periods take more ticks than are simulated at once."
-    return doc.listing("Predicted limit cycles, at the output", result.confirmations, columns, note)
+    return doc.listing("Predicted limit cycles, at the output", result.cycles, columns, note)
 
 
 def _rests(result: LimitCycles, fine: Unit) -> doc.Block:
@@ -92,5 +94,5 @@ def _rests(result: LimitCycles, fine: Unit) -> doc.Block:
         doc.of("rest.frequency_hz", "hz", "at", "Hz", format="sig:3"),
     ]
     note = "The drive as it is: dry friction, play, quantisation and limits at work. "
-    listed = ("What steps end in", result.rests, columns, note + settling.FROM_THE_LARGEST)
+    listed = ("What steps end in", result.settlings, columns, note + settling.FROM_THE_LARGEST)
     return doc.listing(*listed, status=lambda one: "warn" if one.hunting else None)

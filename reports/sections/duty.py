@@ -19,9 +19,9 @@ _SHOWN = 400
 def section(result: Duty) -> doc.Section:
     intro = (
         "The motion is simulated until its rms current is steady, friction, play and limits at work, the "
-        "overload protection left out; a rest goes on from there. Their current, repeated without end, heats "
-        "the winding by its mean copper loss and drives the overload state. Power is of copper and shaft: a "
-        "supply or brake resistor takes what comes back."
+        "overload protection left out; a rest goes on from there, and a motion begins from the rest. Their "
+        "current, repeated without end, heats the winding by its mean copper loss and drives the overload "
+        "state. Power is of copper and shaft: a supply or brake resistor takes what comes back."
     )
     note = f"Duty: {asked_words(result)}."
     if runs(result.design) and follows_angle(result.design) and result.asked.share < 1.0:
@@ -31,11 +31,13 @@ def section(result: Duty) -> doc.Section:
     if result.overload is None:
         note += " No overload state: the design states no limits.peak_time."
     table = doc.table("What the duty asks of the motor", _COLUMNS, _rows(result), note)
-    told = doc.severity(result.verdict)
-    told = "warn" if told == "info" and result.limited else told
+    severity = doc.severity(result.verdict)
+    severity = "warn" if severity == "info" and result.limited else severity
     own = requirements.table(result.requirements)
     blocks, words = [table, *own, _figure(result)], summary(result)
-    return doc.section("duty", "Duty cycle", blocks, result=words, intro=intro, status=told, told=told)
+    return doc.section(
+        "duty", "Duty cycle", blocks, result=words, intro=intro, status=severity, severity=severity
+    )
 
 
 RATED = {
@@ -76,9 +78,9 @@ def _found(result: Duty) -> str:
     """What is beyond its limit, else the current."""
     if beyond := [row for row in _rows(result) if row["_status"] == "fail"]:
         units = [f" {row['unit']}".rstrip() for row in beyond]
-        told = zip(beyond, units, strict=True)
+        shown = zip(beyond, units, strict=True)
         return "; ".join(
-            f"{r['what']} {r['value']:.4g}{unit}, limit {r['limit']:.4g}{unit}" for r, unit in told
+            f"{r['what']} {r['value']:.4g}{unit}, limit {r['limit']:.4g}{unit}" for r, unit in shown
         )
     known = math.isfinite(result.continuous_A)
     limit = f", limit {result.continuous_A:.4g} A" if known else ", and no continuous current is stated"

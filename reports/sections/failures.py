@@ -7,7 +7,7 @@ import numpy as np
 
 from actuator_lti.asked.verdict import Verdict
 from analyses.failures.run import Failures
-from analyses.motion.settling import acting, noticed, told, verdict_of
+from analyses.motion.settling import acting, noticed, swing_words, verdict_of
 from reports import document as doc
 from reports.charts import style
 from reports.numbers import seconds, short
@@ -33,7 +33,7 @@ def section(result: Failures) -> doc.Section:
     if asked.speed_rad_s:
         held = f"turns at a command of {out.per('s').of(asked.speed_rad_s)}{acting(result.before[0].rest)}"
     if swing is not None:
-        held = f"{_unsteady(result)}, {told(result.design, swing, *command_unit(result.design))},"
+        held = f"{_unsteady(result)}, {swing_words(result.design, swing, *command_unit(result.design))},"
     stop = f"the stop is {out.of(asked.stop_rad, 4)} away" if asked.stop_rad < inf else "no stop is stated"
     intro = (
         f"Each failure is simulated from a drive that {held} under {load} (positive pushes forward). "
@@ -48,11 +48,11 @@ def section(result: Failures) -> doc.Section:
     left = [f"{NAMES[name]}: not for this drive, as {why}." for name, why in result.left_out.items()]
     own = requirements.table(result.requirements)
     blocks = [_table(result, out), *own, _figure(result, out), *map(doc.text, left)]
-    status = told_as = "info" if result.verdict is None else doc.severity(result.verdict)
+    status = severity = "info" if result.verdict is None else doc.severity(result.verdict)
     if status == "info" and verdict_of(result.design, swing) is not Verdict.MET:
-        told_as = "warn"
+        severity = "warn"
     words, title = summary(result), "Failure cases"
-    return doc.section("failures", title, blocks, result=words, intro=intro, status=status, told=told_as)
+    return doc.section("failures", title, blocks, result=words, intro=intro, status=status, severity=severity)
 
 
 def _turns(result: Failures) -> bool:
@@ -83,7 +83,9 @@ def summary(result: Failures) -> str:
     swing = noticed(result.design, result.before)
     if swing is not None and verdict_of(result.design, swing) is not Verdict.MET:
         does = f"{_unsteady(result)} under {result.asked.load_Nm:g} {result.design.load_unit}"
-        words += f"; before it the drive {does}: {told(result.design, swing, *command_unit(result.design))}"
+        words += (
+            f"; before it the drive {does}: {swing_words(result.design, swing, *command_unit(result.design))}"
+        )
     return f"{NAMES[worst.name]} {words}. {requirements.result(result.requirements)}".rstrip()
 
 
@@ -123,8 +125,8 @@ def _figure(result: Failures, out: Unit) -> doc.Block:
     for k, (case, count) in enumerate(zip(shown, counts, strict=True)):
         keep = np.unique(np.linspace(0, count - 1, min(count, _SHOWN)).astype(int))
         time = case.time_s[keep] * per_s
-        course = case.speed_rad_s if _turns(result) else case.deflection_rad
-        top.curve(time, out.scale * course[keep], NAMES[case.name], **style.series(k))
+        motion = case.speed_rad_s if _turns(result) else case.deflection_rad
+        top.curve(time, out.scale * motion[keep], NAMES[case.name], **style.series(k))
         bottom.curve(time, case.moment_Nm[keep], NAMES[case.name], **style.series(k))
     if asked.stop_rad < inf and not _turns(result):
         top.rule_y(out.scale * asked.stop_rad, "stop", seen=True, colour=style.RED, dash=1)

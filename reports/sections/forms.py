@@ -63,7 +63,7 @@ def _row(name: str, form: str, figures: LoopFigures, ideal: LoopFigures | None) 
     own, reference = known["phase_margin_deg"], margin_row(ideal)["phase_margin_deg"] if ideal else None
     cost = None if own is None or reference is None or form == "ideal" else own - reference
     row = {**known, "loop": loop_words(name), "form": FORMS[form], "phase_cost_deg": cost}
-    return row | ({"_status": "fail"} if figures.sound is False else {})
+    return row | ({"_status": "fail"} if figures.is_stable is False else {})
 
 
 def _overlay(forms: Mapping[str, Mapping[str, LoopFigures]]) -> doc.Block:
@@ -172,8 +172,10 @@ def operating_points(points: Sequence[OperatingPointFigures], design: Design) ->
 
 
 def _spread(points: Sequence[OperatingPointFigures]) -> str:
-    for sound, words in ((False, "Unstable"), (None, "Stability is not known")):
-        here = [p.place or p.label for p in points if any(f.sound is sound for f in p.figures.values())]
+    for stability, words in ((False, "Unstable"), (None, "Stability is not known")):
+        here = [
+            p.place or p.label for p in points if any(f.is_stable is stability for f in p.figures.values())
+        ]
         if here:
             return f"{words} at {len(here)} of {len(points)} operating points: {'; '.join(here)}."
     each = [(f"{n} loop, {p.place or p.label}", f.judged) for p in points for n, f in p.figures.items()]
@@ -192,7 +194,7 @@ def _operating_point(point: OperatingPointFigures, scale: float) -> doc.Row:
         known = margin_row(one) | response_row(one)
         row[f"{name}_phase"] = known["phase_margin_deg"] if one.stable else one.margins.verdict
         row |= {f"{name}_gain": known["gain_margin_db"], f"{name}_band": known["minus3db_hz"] or None}
-        row |= {"_status": "fail"} if result.sound is False else {}
+        row |= {"_status": "fail"} if result.is_stable is False else {}
     return row
 
 

@@ -7,8 +7,15 @@ import numpy as np
 from actuator_lti.design.model import Command, Design
 from actuator_lti.drive.steady import torque_gain_Nm_rad
 from analyses.friction_effects.result import FrictionEffects, FrictionPoint
-from analyses.limit_cycles.run import Confirmation
-from analyses.motion.settling import FROM_THE_LARGEST, Settling, accepted_rad, noticed, told, verdict_of
+from analyses.limit_cycles.run import CycleResult
+from analyses.motion.settling import (
+    FROM_THE_LARGEST,
+    Settling,
+    accepted_rad,
+    noticed,
+    swing_words,
+    verdict_of,
+)
 from analyses.motion.settling import words as end_words
 from nonlinear.bench.operating_motion import quiet
 from reports import document as doc
@@ -33,8 +40,8 @@ def section(result: FrictionEffects) -> doc.Section:
         "Friction alone: counts and noise of the sensors are left out."
     )
     status, words = tally(items).role, _summary(result, fine)
-    told: doc.Severity = "info" if status == "pass" else status
-    return doc.section(id, title, blocks, result=words, intro=intro, status=status, told=told)
+    severity: doc.Severity = "info" if status == "pass" else status
+    return doc.section(id, title, blocks, result=words, intro=intro, status=status, severity=severity)
 
 
 def _cycle_verdict(design: Design, point: FrictionPoint, fine: Unit, load: str) -> doc.VerdictItem:
@@ -45,12 +52,12 @@ def _cycle_verdict(design: Design, point: FrictionPoint, fine: Unit, load: str) 
         slip = f"±{size} at {one.frequency_hz:.3g} Hz{kind}"
     sizes = len(cycles.settlings)
     result = f"at rest after steps of {sizes} sizes" if sizes > 1 else "at rest after a step of one size"
-    result = result if swing is None else told(design, swing, *fine)
+    result = result if swing is None else swing_words(design, swing, *fine)
     alone = " without counts and noise" if swing is not None and quiet(design) != design else ""
     agree = "as predicted" if cycles.as_predicted else "not as predicted"
     if not cycles.described:
         agree += "; the describing function is refuted: a sinusoid spends no time at rest"
-    predicted = "; ".join(_predicted(item, fine) for item in cycles.confirmations) or "none"
+    predicted = "; ".join(_predicted(item, fine) for item in cycles.cycles) or "none"
     diverges = swing is not None and swing.rest.verdict == "diverging"  # of no size
     return doc.verdict(
         f"validation-hunting-{point.load_Nm:g}",
@@ -65,7 +72,7 @@ def _cycle_verdict(design: Design, point: FrictionPoint, fine: Unit, load: str) 
     )
 
 
-def _predicted(item: Confirmation, fine: Unit) -> str:
+def _predicted(item: CycleResult, fine: Unit) -> str:
     one = item.cycle
     kind = "stable" if one.stable else "unstable, the limit of what friction damps"
     seen = "" if item.ratio is None else f", simulated at {item.ratio:.2f} of that"
@@ -215,7 +222,7 @@ def _figure(result: FrictionEffects, fine: Unit, load: str) -> list[doc.Block]:
 def _summary(result: FrictionEffects, fine: Unit) -> str:
     settlings = [one for point in result.points for one in point.cycles.settlings]
     if (swing := noticed(result.design, settlings)) is not None:
-        why = told(result.design, swing, *fine)
+        why = swing_words(result.design, swing, *fine)
         alone = "Without counts and noise a" if quiet(result.design) != result.design else "A"
         return f"{alone} step does not come to rest: {why}."
     if any(abs(one.rest.error) > LEFT * one.amplitude_rad for one in settlings):

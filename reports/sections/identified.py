@@ -67,11 +67,11 @@ def constant_words(fit: Fit, axis: str = "rotary") -> str:
     hang = [name for name in fit.fixed if share(name) > HANGS]
     if not hang and (given := given_constant(fit)) is not None:
         hang = [given]
-    told = []
+    constants = []
     for one, name in ((parameter(name, axis), name) for name in hang):
         label = one.label[:1].lower() + one.label[1:]
-        told.append(f"{label}, {show(one.scale * fit[name], 'sig:4')} {one.unit}")
-    return f", all at the design's {' and '.join(told)}" if told else ""
+        constants.append(f"{label}, {show(one.scale * fit[name], 'sig:4')} {one.unit}")
+    return f", all at the design's {' and '.join(constants)}" if constants else ""
 
 
 def parameter_table(

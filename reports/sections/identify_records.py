@@ -65,8 +65,8 @@ def _result(result: BenchResult, axis: str) -> str:
         found = result.refined
         parts = [f"{key} {identified.value_words(found, key, axis)}" for key in found.names[:3]]
         parts[0] = f"refined by simulation: {parts[0]}"
-    told = ", ".join(parts) or "the records tell neither inertia nor friction"
-    words = f"{capital(told)}{identified.constant_words(model, axis)}."
+    values = ", ".join(parts) or "the records tell neither inertia nor friction"
+    words = f"{capital(values)}{identified.constant_words(model, axis)}."
     if result.unmade:
         return " ".join([*left_out_of(result.findings), words, "No design comes of it."])
     worst = max(result.resimulated, key=lambda one: one.beyond_noise)

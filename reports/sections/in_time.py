@@ -41,8 +41,8 @@ def _sweep(sweep: BenchSweep) -> doc.Block:
     chart, (top, bottom) = style.stack(400.0, 1.1, 1.0)
     phase = style.phases(sweep.linear)
     seen = phase + np.degrees(np.angle(sweep.open_loop / sweep.linear))
-    size, size_seen = style.decibels(sweep.linear), style.decibels(sweep.open_loop)
-    for panel, linear, found in ((top, size, size_seen), (bottom, phase, seen)):
+    size, size_simulated = style.decibels(sweep.linear), style.decibels(sweep.open_loop)
+    for panel, linear, found in ((top, size, size_simulated), (bottom, phase, seen)):
         panel.curve(sweep.frequency_hz, linear, "linear loop", colour=style.BLUE)
         panel.points(sweep.frequency_hz, found, "simulated", size=5.0, hollow=True, colour=style.ORANGE)
     style.bode_axes(top, bottom, phase)

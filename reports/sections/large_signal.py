@@ -42,7 +42,7 @@ def section(result: LargeSignals) -> doc.Section:
     )
     return doc.section(
         "large-signal", "Large signals", blocks, result=_result(bode, out, _linear(design)), intro=intro,
-        status=tally(items).role if items else "info", told="info",
+        status=tally(items).role if items else "info", severity="info",
     )  # fmt: skip
 
 

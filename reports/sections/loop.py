@@ -42,7 +42,7 @@ def section(name: str, design: Design, figures: LoopFigures) -> doc.Section:
         f"Cut at {place} ({figures.loop.unit_in}){rate}, with {inner}. The margins are {evidence}: "
         f"{margins.MEANING[evidence]}."
     )
-    words, status = result(figures), margins.worst_status([figures.sound])
+    words, status = result(figures), margins.worst_status([figures.is_stable])
     return doc.section(f"loop-{name}", title, blocks, result=words, intro=intro, status=status)
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from actuator_lti.margins.results import StabilityMargins
 from analyses.finite import finite
 from analyses.linear.loop_figures import LoopFigures
-from analyses.linear.responses import Curve, answer_curve, curve, nichols_curve, nyquist_curve, response_at
+from analyses.linear.responses import Curve, curve, nichols_curve, nyquist_curve, response_at, response_curve
 from reports import document as doc
 from reports.charts import style
 from reports.numbers import gain_margin
@@ -129,8 +129,8 @@ def closed_bode(
 ) -> doc.Block:
     other, band = figures.reference, None if returns(figures) else figures.bandwidth
     first = "rotor free" if locked else "to the command" if other else "closed loop"
-    curves = [(first, answer_curve(figures, grid))]
-    curves += [("to the reference", answer_curve(other, grid))] if other is not None else []
+    curves = [(first, response_curve(figures, grid))]
+    curves += [("to the reference", response_curve(other, grid))] if other is not None else []
     curves += [("rotor locked", curve(locked.plain_response, grid))] if locked and locked.stable else []
     chart, (top, bottom) = style.stack(410.0, 1.0, 1.0, width=style.HALF, loop=name)
     both(curves, nyquist_hz(figures), top, bottom, span=60.0, top_room=0.15)

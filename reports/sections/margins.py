@@ -24,7 +24,7 @@ MEANING = {
     "certified": "exact arithmetic on the numbers of the loop as stored, each crossing and pole in a proven "
     "interval, and the same answer for numbers 8 units in the last place away",
     "checked": "double precision; poles and Nyquist count agree, no pole lies within its own error of the "
-    "border",
+    "stability limit",
     "withheld": "the numbers of the loop do not determine the answer",
 }
 
@@ -114,11 +114,14 @@ def brief(result: Margins) -> Brief:
     head = f"{result.design.name}: {result.asked.form}, {_where(result)}"
     tables = [margin_table(own), spread_table(result.operating_points, known), response_table(every)]
     counts = [len(one.margins.gain_margins) + len(one.margins.phase_margins) for one in known.values()]
-    more, told = [crossing_table(own)] if max(counts, default=0) > 2 else [], list[str]()
+    more, extra = [crossing_table(own)] if max(counts, default=0) > 2 else [], list[str]()
     if result.measured is not None:
         more += [block for block in measured.blocks(result.measured) if block["kind"] == "table"]
-        told += [measured.words(result.measured), *(f"measured loop: {one}" for one in result.measured.notes)]
-    notes = [*told, *by_itself_notes(known), *evidence_notes(known), *_notes(result, known)]
+        extra += [
+            measured.words(result.measured),
+            *(f"measured loop: {one}" for one in result.measured.notes),
+        ]
+    notes = [*extra, *by_itself_notes(known), *evidence_notes(known), *_notes(result, known)]
     shown = [side_by_side(head, tables), *more] if known else []
     return Brief(first["result"], [*shown, *judged["blocks"]], notes)
 
@@ -132,7 +135,7 @@ def _below_custom(result: Margins) -> str:
     """Margins below what is customary that no requirement names: without any, and of a loop around it."""
     low, judged = [], bool(result.requirements)
     for name, one in (result.around if judged else _named(result)).items():
-        for quantity, value in figures_of(one.judged.margins).items() if one.sound else ():
+        for quantity, value in figures_of(one.judged.margins).items() if one.is_stable else ():
             if value < (usual := CUSTOMARY[quantity]):
                 of = QUANTITIES[quantity]
                 unit = f" {unit_words(of.unit)}".rstrip()
@@ -173,8 +176,8 @@ def _smoothed(result: Margins) -> list[str]:
 def _stability(named: Mapping[str, LoopFigures]) -> str:
     if not named:
         return "the drive has no loop, so there are no margins"
-    for sound, words in DOUBTS.items():
-        if names := [name for name, one in named.items() if one.sound is sound]:
+    for stability, words in DOUBTS.items():
+        if names := [name for name, one in named.items() if one.is_stable is stability]:
             return f"{words}: {', '.join(names)}"
     held = [
         f"; the {label[:1].lower()}{label[1:]}, unstable by itself, is judged with the {HELD[one.loop.name]}"
@@ -189,8 +192,8 @@ def _elsewhere(result: Margins) -> str:
     places: dict[tuple[str, str], list[str]] = {}
     for point in result.operating_points:
         for name, one in point.figures.items():
-            if not one.sound and name in result.loops and result.loops[name].sound:
-                where = place_words(point.place), "not" if one.sound is False else "not known to be"
+            if not one.is_stable and name in result.loops and result.loops[name].is_stable:
+                where = place_words(point.place), "not" if one.is_stable is False else "not known to be"
                 places.setdefault(where, []).append(name)
     return "".join(
         f"; {where} these loops are {doubt} stable: {', '.join(names)}"
@@ -211,7 +214,7 @@ def _by_angle(result: Margins) -> str:
     """Loops unstable only by cogging, whose phase a sheet leaves open, or by a slope held over a tick."""
     away = "which drives the rotor away at angle 0: motor.cogging_phase says where it stands"
     held = "only as the slope of a torque over the angle, held over a tick, is slightly active"
-    by_hold = [name for name, one in result.loops.items() if one.by_hold and not one.sound]
+    by_hold = [name for name, one in result.loops.items() if one.by_hold and not one.is_stable]
     causes = {f"by cogging alone, {away}": result.by_cogging, held: by_hold}
     named = {why: ", ".join(LOOPS[name].lower() for name in names) for why, names in causes.items()}
     return "".join(f" ({loops}: {why})" for why, loops in named.items() if loops)
@@ -243,7 +246,7 @@ def _loops(
         f"Each loop is cut at its own error{law or ','} with the loops inside it closed and those outside it "
         f"open. {how}{meaning}"
     )
-    status = worst_status([one.sound for one in loops.values()])
+    status = worst_status([one.is_stable for one in loops.values()])
     return doc.section(
         "margins", "Margins and bandwidths", blocks, intro=intro, status=status,
         verdict=Verdict.NOT_PROVEN if status == "warn" else None,
@@ -253,8 +256,8 @@ def _loops(
 def result(figures: Mapping[str, LoopFigures]) -> str:
     doubts = [
         f"{words}: {', '.join(names)}."
-        for words, sound in (("Not stable", False), ("Not known to be stable", None))
-        if (names := [LOOPS[name].lower() for name, one in figures.items() if one.sound is sound])
+        for words, is_stable in (("Not stable", False), ("Not known to be stable", None))
+        if (names := [LOOPS[name].lower() for name, one in figures.items() if one.is_stable is is_stable])
     ]
     if doubts or not figures:
         return " ".join(doubts)
@@ -328,8 +331,8 @@ def spread_table(points: Sequence[OperatingPointFigures], named: Mapping[str, Lo
         row |= {name.split("_")[0]: range_words(range_, name) for name, range_ in own.items()}
         doubts = {words: list[str]() for words in DOUBTS.values()}
         for point in seen:
-            if name in point.figures and not (sound := point.figures[name].sound):
-                doubts[DOUBTS[sound]].append(point.place or "sliding")
+            if name in point.figures and not (is_stable := point.figures[name].is_stable):
+                doubts[DOUBTS[is_stable]].append(point.place or "sliding")
         said = [f"{words} {'; '.join(where)}" for words, where in doubts.items() if where]
         row |= {"gain": "; ".join(said)} if said else {}
         rows += [row] if len(row) > 1 else []

@@ -84,9 +84,9 @@ def _result(result: MonteCarloResult) -> str:
 
 
 def _lost(result: MonteCarloResult) -> str:
-    told = {"The drive is not stable": result.unstable, f"Its stability is {UNRESOLVED}": result.unresolved}
+    doubts = {"The drive is not stable": result.unstable, f"Its stability is {UNRESOLVED}": result.unresolved}
     return "".join(
-        f" {words} in {100.0 * share:.3g} % of the samples." for words, share in told.items() if share
+        f" {words} in {100.0 * share:.3g} % of the samples." for words, share in doubts.items() if share
     )
 
 
@@ -249,8 +249,8 @@ def _driver_table(result: MonteCarloResult) -> doc.Block:
             return ""
         one, unit = item[1][place], result.columns[item[0]].unit
         ends = [in_shown(value, unit) for value in (one.low, one.high)]
-        told = ([or_none(value, digits) for value in ends] for digits in range(3, 7))
-        return next((f"{one.path}: {low} to {high}" for low, high in told if low != high), "")
+        texts = ([or_none(value, digits) for value in ends] for digits in range(3, 7))
+        return next((f"{one.path}: {low} to {high}" for low, high in texts if low != high), "")
 
     places = enumerate((("first", "Driven most by"), ("second", "then by"), ("third", "then by")))
     columns = [

@@ -46,8 +46,8 @@ def section(design: Design, warnings: Sequence[str] = ()) -> doc.Section:
     if parameters:
         result = f"{len(parameters)} values; {assumed} of them assumed (grade X), {ungraded} without a grade."
     if assumed:
-        told = f"{assumed} of {len(parameters)} values are assumed."
-        findings.append(doc.Finding(severity="info", text=told, where="parameters"))
+        text = f"{assumed} of {len(parameters)} values are assumed."
+        findings.append(doc.Finding(severity="info", text=text, where="parameters"))
     return doc.section(
         "parameters", "Parameters and their sources", blocks, result=result,
         intro=GRADES if parameters else "", status="warn" if warnings else "info", findings=findings,

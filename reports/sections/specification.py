@@ -12,7 +12,7 @@ from reports.numbers import short, significant
 from reports.sections.limits import words_of
 from reports.sections.names import Unit, output_unit
 
-ALIKE = 0.05  # relative: closed form and simulation are not told apart in the headline
+EQUAL = 0.05  # relative: closed form and simulation are not told apart in the headline
 BOUND_COLOURS = {
     "voltage limit": style.RED,
     "drive signal at its limit": style.RED,
@@ -28,13 +28,15 @@ def section(result: Specification) -> doc.Section:
         "Closed form and simulation side by side, behind the profile of the command; manoeuvres and steps "
         "with it. Output side unless a column says motor."
     )
-    words, told = _result(result), list[doc.Finding]()
+    words, findings = _result(result), list[doc.Finding]()
     for one in result.capabilities:
         if one.duty is not None and one.duty < 0.995:
             load = f"{one.figures.load_Nm:g} {result.design.load_unit}"
             text = f"At {load} load the continuous current allows a duty of {100.0 * one.duty:.0f} %."
-            told.append(doc.Finding(severity="warn", text=text, where="specification"))
-    return doc.section("specification", "Actuator figures", blocks, result=words, intro=intro, findings=told)
+            findings.append(doc.Finding(severity="warn", text=text, where="specification"))
+    return doc.section(
+        "specification", "Actuator figures", blocks, result=words, intro=intro, findings=findings
+    )
 
 
 def _result(result: Specification) -> str:
@@ -49,7 +51,7 @@ def _result(result: Specification) -> str:
         (one.figures.acceleration_rad_s2, one.simulated_acceleration_rad_s2, push),
     ):
         if value is not None and math.isfinite(value):
-            unlike = found is not None and abs(found - value) > ALIKE * abs(value)
+            unlike = found is not None and abs(found - value) > EQUAL * abs(value)
             also = f" (simulated {significant(scale * found)})" if found is not None and unlike else ""
             parts.append(f"{significant(scale * value)} {per}{also}")
     load = f"{one.figures.load_Nm:g} {result.design.load_unit}"

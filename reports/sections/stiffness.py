@@ -124,12 +124,12 @@ def _lost_motion(result: Stiffness) -> doc.Block:
     assert lost is not None
     columns = [
         doc.of(lambda row: row[0], "what", "What"),
-        doc.of(lambda row: row[1], "foreseen", "Predicted", **size),
-        doc.of(lambda row: row[2], "seen", "Simulated", **size),
+        doc.of(lambda row: row[1], "predicted", "Predicted", **size),
+        doc.of(lambda row: row[2], "simulated", "Simulated", **size),
     ]
     rows = [("play", lost.play_rad, None)]
     if result.design.load.moment_max_Nm > 0.0:  # the largest load is known
-        rows.append(("lost motion", lost.foreseen_rad, lost.seen_rad))
+        rows.append(("lost motion", lost.predicted_rad, lost.simulated_rad))
     note = (
         "Lost motion as gear makers read it, the motor held: between the middles of hysteresis at ±3 % of "
         f"the largest load {push_words(result.design)}, without the load's friction."
@@ -146,7 +146,7 @@ def _at_rest(result: Stiffness, unit: str) -> doc.Block:
     columns = [
         doc.of("moment_Nm", "moment", f"Load {push_words(result.design)}, peak", of_load, format="sig:3"),
         doc.of("frequency_hz", "frequency_hz", "Frequency", "Hz", format="sig:3"),
-        doc.of(lambda one: abs(one.seen_Nm_rad), "seen", "Stiffness", unit, format="sig:4"),
+        doc.of(lambda one: abs(one.simulated_Nm_rad), "simulated", "Stiffness", unit, format="sig:4"),
     ]
     return doc.listing("At rest, by amplitude", result.at_rest, columns, note)
 
@@ -160,8 +160,8 @@ def _checks(result: Stiffness, unit: str) -> doc.Block:
     size: dict[str, Any] = {"unit": unit, "format": "sig:6"}
     columns = [
         doc.of("frequency_hz", "frequency_hz", "Frequency", "Hz", format="sig:4"),
-        doc.of(lambda one: _or_infinite(abs(one.foreseen_Nm_rad)), "foreseen", "Predicted", **size),
-        doc.of(lambda one: _or_infinite(abs(one.seen_Nm_rad)), "seen", "Simulated", **size),
+        doc.of(lambda one: _or_infinite(abs(one.predicted_Nm_rad)), "predicted", "Predicted", **size),
+        doc.of(lambda one: _or_infinite(abs(one.simulated_Nm_rad)), "simulated", "Simulated", **size),
         doc.of("difference", "difference", "Relative difference", format="sig:2"),
         *([doc.of(lambda one: _way(one, "{}"), "way", "Friction")] if _way(result.checks[0], "{}") else []),
     ]

@@ -38,14 +38,14 @@ def write(result: TuningResult, folder: Path | None) -> list[str]:
 
 def summary(result: TuningResult) -> str:
     """What was found of what is searched for, and which of the other requirements are not met."""
-    told = [_searched(result)]
+    sentences = [_searched(result)]
     if result.others and all(one.verdict is Verdict.MET for one in result.others):
-        told.append("The tuned design meets every other requirement.")
+        sentences.append("The tuned design meets every other requirement.")
     for word in (Verdict.NOT_MET, Verdict.NOT_PROVEN):
         open_ones = (one for one in result.others if one.verdict == word and not one.passes)
         names = "; ".join(map(label, open_ones))
-        told += [f"{word.capitalize()}, and not searched for: {names}."] if names else []
-    return " ".join(told)
+        sentences += [f"{word.capitalize()}, and not searched for: {names}."] if names else []
+    return " ".join(sentences)
 
 
 def _searched(result: TuningResult) -> str:

@@ -117,6 +117,6 @@ def test_a_wait_is_told_once_on_a_terminal(terminal: bool, after_s: float, said:
     waiting._tell.cache_clear()
     for wait_s in (10.0 if said else 0.0, 0.2):
         stream.written.clear()
-        with waiting.told_if_slow("the kettle boils", after_s):
+        with waiting.note_if_slow("the kettle boils", after_s):
             assert stream.written.wait(wait_s) is (wait_s > 1.0)
     assert stream.getvalue() == said

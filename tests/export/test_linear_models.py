@@ -64,8 +64,8 @@ def system(entry: dict[str, Any]) -> Any:
 def same(found: Any, known: Any) -> bool:
     if isinstance(known, str):
         return bool(found == known)
-    alike = np.allclose(np.ravel(found), np.ravel(known), rtol=1e-12, atol=0.0)
-    return bool(alike) and np.size(found) == np.size(known)
+    equal = np.allclose(np.ravel(found), np.ravel(known), rtol=1e-12, atol=0.0)
+    return bool(equal) and np.size(found) == np.size(known)
 
 
 @pytest.mark.parametrize(("name", "to"), [*((name, "mat") for name in NAMES), *OTHERS])
@@ -92,7 +92,7 @@ def test_read_back_they_have_the_same_margins_and_responses(name: str, to: str, 
                 for key, value in again.items():
                     assert same(entry["margins"][key], value), (each, key)
         assert responds_alike(system(kept["responses"]["command"]), loops.plain_response)
-        assert responds_alike(system(kept["responses"]["load"]), loops.moment_system())
+        assert responds_alike(system(kept["responses"]["load"]), loops.load_torque_system())
 
 
 def responds_alike(found: Any, known: Any) -> bool:

@@ -201,7 +201,7 @@ def called(given: list[str]) -> None:
     for text in (out.getvalue(), said):
         assert all(c in "\n\t" or unicodedata.category(c) not in ("Cc", "Cs") for c in text), text
     assert all(len(line) <= 1100 for line in said.splitlines()), said
-    assert "unforeseen" not in said, said
+    assert "unexpected" not in said, said
     assert "Traceback" not in said, said
     assert status in (0, 1, 2, 3), (status, said)
     assert len(lines) > 0 if status == 2 else len(lines) == (status == 3), (status, said)

@@ -92,9 +92,9 @@ def test_a_figure_that_crashes_leaves_the_page(tmp_path, monkeypatch, cli) -> No
 
 
 @pytest.mark.parametrize(("error", "status", "words"), [
-    (KeyError("x"), 3, "unforeseen KeyError"),
+    (KeyError("x"), 3, "unexpected KeyError"),
     (ValueError("f(a) and f(b) must have different signs"), 3, "different signs"),
-    (RecursionError(), 3, "unforeseen RecursionError"),
+    (RecursionError(), 3, "unexpected RecursionError"),
     (MemoryError(), 3, "not enough memory"),
     (NumericalError("try a\nlarger band"), 3, "numerical failure: try a larger band"),
     (InputError("a = 1: must be 2", where="x.toml"), 2, "actuator-lti: x.toml: a = 1: must be 2"),

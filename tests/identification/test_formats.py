@@ -242,6 +242,7 @@ def _signal(text: str) -> Callable[[Path], None]:
     (lambda p: (p / "r.csv").write_text("a,b\n1,2\n"), "describe it in a record file"),
     (lambda p: (p / "r.csv").write_text("a,b,c,d,e,f\n1,2,3,4,5,6\n"), '"f": no name'),
     (lambda p: (p / "r.csv").write_text("a,b\n1,2\n"), "its number from 1"),
+    (lambda p: (p / "r.csv").write_text("n,i_A\n1,2\n"), '"time": no column of the time.*"n": no name'),
     (lambda p: (p / "r.csv.gz").write_bytes(gzip.compress(b"a,b\n1,2\n")), "binary or packed"),
     (lambda p: (p / "r.csv").write_bytes(bytes(range(256))), "binary or packed"),
     (lambda p: (p / "r.csv").write_text("time_s,i_A\n1,2\n1,3\n2,3"), 'disorder = "drop" in a record'),

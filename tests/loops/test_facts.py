@@ -105,7 +105,7 @@ def test_the_torque_that_speeds_up_the_load_brings_friction_too() -> None:
     run = simulate(design, commands.step(1e3), duration_s=0.08, load_Nm=-0.5)
     speed, half = run.motor_speed_rad_s / 10, len(run.time_s) // 2
     assert (speed[-1] - speed[half]) / (run.time_s[-1] - run.time_s[half]) == pytest.approx(by_hand, rel=1e-6)
-    rigid = replace(design, coupling=None)  # rubs with the load's moment alone (equation 9)
+    rigid = replace(design, coupling=None)  # rubs with the load's torque alone (equation 9)
     by_hand = (0.48 - 0.01 - 0.12 * 0.5) / 4e-5 / 10
     assert drive_figures(rigid, 0.5).acceleration_rad_s2 == pytest.approx(by_hand, rel=1e-12)
 

@@ -280,7 +280,9 @@ def test_every_form_of_a_drive_tends_to_the_ideal_one(form, drive, final, order)
         pairs = [(loop.open_loop, getattr(ideal, name).open_loop) for name, loop in loops.present.items()]
         points = ("w_ref", "output")
         pairs += [(loops.break_points[p].open_loop, ideal.break_points[p].open_loop) for p in points]
-        paths = ("reference_to_output", "moment_to_output") if drive.coupling else ("reference_to_output",)
+        paths = (
+            ("reference_to_output", "load_torque_to_output") if drive.coupling else ("reference_to_output",)
+        )
         pairs += [(getattr(loops, name), getattr(ideal, name)) for name in paths]
         gaps = [np.max(np.abs(response(a, omega) / response(b, omega) - 1)) for a, b in pairs]
         worst.append(np.array(gaps))

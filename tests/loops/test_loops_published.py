@@ -162,7 +162,7 @@ def test_a_free_rotor_has_its_back_emf() -> None:
 
 @pytest.mark.parametrize("name", shipped_designs())
 def test_sampled_is_the_zero_order_hold_of_ideal(name: str) -> None:
-    """Without own moments, which are held over a tick, and without delay: scipy's hold of the same."""
+    """Without own torques, which are held over a tick, and without delay: scipy's hold of the same."""
     design = prompt(name)
     design = replace(design, load=design.load.bare(), motor=design.motor.straight())
     ideal, sampled = plant(design, "ideal"), plant(design)
@@ -282,7 +282,7 @@ def test_the_periodic_response_is_that_of_the_time_invariant_system(name: str) -
     """Two derivations: M ticks followed one after the other, and one system of M n states."""
     loops, result = assemble_loops(load_design(name)), compliance(load_design(name))
     z = np.exp(2j * np.pi * np.geomspace(0.1, 1000.0, 30) * result.period_s)
-    lifted = loops.moment_to_output
+    lifted = loops.load_torque_to_output
     assert np.abs(result(z) / lifted(z) - 1.0).max() < 1e-9
     assert result.slowest == pytest.approx(np.abs(lifted.poles()).max(), rel=1e-9)
 

@@ -13,7 +13,7 @@ from actuator_lti import assemble_loops
 from actuator_lti.design import load_design, model, with_values
 from actuator_lti.drive.profile import CommandMean, profile_note
 from actuator_lti.loops import PeriodicLoop, exact_margins, periodic_loop
-from actuator_lti.loops.periodic import GAINS, first_border
+from actuator_lti.loops.periodic import GAINS, first_limit
 from actuator_lti.loops.tick import Block, mean_response
 from actuator_lti.systems.resolvent import responses
 from analyses.linear.loop_figures import all_loop_figures
@@ -98,7 +98,7 @@ def test_a_border_is_found_however_narrow_what_lies_behind_it(above: float) -> N
     first, second = ((np.array([[a]]), np.array([[b]]), np.eye(1)) for a, b in ((0.0, -size), (6.0, 1.0)))
     loop = PeriodicLoop([first, second], 1.0)
     assert loop.radius(1.0) == pytest.approx(5.0 * size, rel=1e-14)
-    upper = first_border(lambda g: loop.radius(g) - 1.0, GAINS, inf, 50)
+    upper = first_limit(lambda g: loop.radius(g) - 1.0, GAINS, inf, 50)
     assert upper == pytest.approx(3.0 * (1.0 - sqrt(above / (1.0 + above))), rel=1e-7)
 
 

@@ -194,7 +194,7 @@ def test_a_self_locking_path_feels_it_as_friction_alone() -> None:
     run = simulate(design, commands.hold(), 50 * Ts, initial=State(motor_speed_rad_s=80.0))
     w = run.motor_speed_rad_s
     assert w == pytest.approx(80.0 * (1.0 - 2.0 * D / N**2 * Ts / J) ** np.arange(w.size), rel=1e-12)
-    assert wire(design).plant.moment == {}
+    assert wire(design).plant.load_torque == {}
 
 
 def test_energy_of_the_moment_is_work_on_the_load() -> None:

@@ -58,7 +58,7 @@ def nearly_tangent(rng: np.random.Generator) -> control.TransferFunction:
     return control.tf([gain, 0.0], [1.0, 2.0 * zeta * w, w * w])
 
 
-def cancelled_on_the_border(rng: np.random.Generator) -> control.TransferFunction:
+def cancelled_at_the_limit(rng: np.random.Generator) -> control.TransferFunction:
     """Integrators or undamped pairs in numerator and denominator alike, of small integers: exact."""
     hidden = np.array([1.0, 0.0]) if rng.random() < 0.5 else np.array([1.0, 0.0, float(rng.integers(1, 9))])
     den = poly([-float(k) + 0j for k in rng.integers(1, 6, int(rng.integers(1, 4)))])
@@ -106,7 +106,7 @@ MOST_RAD = 300.0  # that the delay turns by
 CERTIFIED_LATE = 0.1  # share of the loops behind a delay: by intervals in certified arithmetic, the slow way
 Family = Callable[[np.random.Generator], control.LTI]
 ALL: tuple[Family, ...] = (
-    *FAMILIES, nearly_lossless, nearly_tangent, cancelled_on_the_border, hard_against_nyquist, plain_sampled,
+    *FAMILIES, nearly_lossless, nearly_tangent, cancelled_at_the_limit, hard_against_nyquist, plain_sampled,
     plain_sampled, delays_in_states,
 )  # fmt: skip
 

@@ -177,14 +177,14 @@ def badly_scaled_and_not_minimal(rng: np.random.Generator) -> Loop:
     return state_space(rng, zeros, poles, bool(rng.random() < 0.5), uniform(rng, 1.0, 7.0))
 
 
-def near_the_border(rng: np.random.Generator) -> Loop:
+def near_the_limit(rng: np.random.Generator) -> Loop:
     """A closed-loop pole pair 1e-5 to 1e-13 (relative) from the border: L at its gain margin, nearly."""
     w, more = uniform(rng, -1.0, 1.0), roots_of(rng, int(rng.integers(1, 4)), 1.0, wrong=0.0)
     shift = uniform(rng, -13.0, -5.0) * signs(rng, 0.5)
     closed = poly([complex(-shift * w, w), complex(-shift * w, -w), *more])
     poles = roots_of(rng, len(more) + 2, 1.0)
     den = poly(poles)
-    return control.tf(closed - den, den) if abs(closed[1] - den[1]) > 1e-3 else near_the_border(rng)
+    return control.tf(closed - den, den) if abs(closed[1] - den[1]) > 1e-3 else near_the_limit(rng)
 
 
 def integrators_and_whole_samples(rng: np.random.Generator) -> Loop:
@@ -224,7 +224,7 @@ FAMILIES: tuple[Callable[[np.random.Generator], Loop], ...] = (
     deadbeat_and_zeros_at_minus_one,
     nearly_ill_posed,
     badly_scaled_and_not_minimal,
-    near_the_border,
+    near_the_limit,
     integrators_and_whole_samples,
     sections_permuted_and_scaled,
 )

@@ -240,7 +240,7 @@ def moved(loop: control.LTI, rng: np.random.Generator) -> control.LTI:
     return control.StateSpace(*parts, loop.dt, remove_useless_states=False)
 
 
-def towards_the_border(loop: control.TransferFunction) -> control.TransferFunction:
+def towards_the_limit(loop: control.TransferFunction) -> control.TransferFunction:
     """Each coefficient moved by 8 ulp so as to carry the closed-loop pole nearest to the border across."""
     num, den = polynomials(loop)
     closed = num + den
@@ -269,5 +269,5 @@ def determined(loop: control.LTI, answer: Facts, rng: np.random.Generator, count
     """Whether neighbours 8 ulp away, random ones and the one most likely to differ, all have these facts."""
     near = [moved(loop, rng) for _ in range(count)]
     if isinstance(loop, control.TransferFunction):
-        near.append(towards_the_border(loop))
+        near.append(towards_the_limit(loop))
     return all(unlike(answer, truth_of(other), 0.05, 5.0) is None for other in near)

@@ -136,11 +136,11 @@ def test_delays_inside_and_in_series_are_certified_alike() -> None:
 
 @pytest.mark.parametrize("certify", [False, True])
 @pytest.mark.parametrize("shift", [0.0, 1e-14, -1e-14, 1e-13, -1e-13, 1e-11, -1e-11, 1e-9, -1e-9])
-def test_a_delayed_loop_at_its_border_is_told_or_withheld(shift: float, certify: bool) -> None:
-    """k exp(-s)/s is stable for k < pi/2, which no double is: never "on the border", never an error."""
+def test_a_delayed_loop_at_its_limit_is_determined_or_withheld(shift: float, certify: bool) -> None:
+    """k exp(-s)/s is stable for k < pi/2, which no double is: never "at the limit", never an error."""
     k = 0.5 * math.pi * (1.0 + shift)
     m = stability_margins(control.tf([k], [1, 0]), delay_s=1.0, certify=certify)
-    assert not m.agreement.border_poles
+    assert not m.agreement.poles_at_limit
     if m.evidence != "withheld":
         with mp.workdps(40):
             assert m.stable is bool(mpf(k) < mp.pi / 2)
@@ -180,7 +180,7 @@ def test_an_unstable_loop_prints_the_delay_margin_that_it_quotes() -> None:
     result = stability_margins(control.tf([10.0], [1.0, 1.0]), delay_s=1.0)
     assert result.delay_margin_s == 0.0
     assert "delay margin: 0 s, as it is not stable" in str(result)
-    assert "delay to the border: " in str(result)
+    assert "delay to the stability limit: " in str(result)
 
 
 @pytest.mark.parametrize("part", [Fraction(1, 2), Fraction(7, 3), Fraction(21, 2)])

@@ -7,7 +7,7 @@ import mpmath
 import numpy as np
 import pytest
 from margin_families import clusters_and_near_cancellations, deadbeat_and_zeros_at_minus_one, orders_1_to_25
-from margin_truth import difference, towards_the_border, truth_of
+from margin_truth import difference, towards_the_limit, truth_of
 
 from actuator_lti import load_design
 from actuator_lti.bandwidth import closed_loop_bandwidth, peaks
@@ -146,10 +146,10 @@ def test_on_the_border_is_what_lies_there_exactly() -> None:
     for k in (2.0, np.nextafter(2.0, 3.0), np.nextafter(2.0, 1.0), 2.0 * (1 + 1e-12), 2.0 * (1 - 1e-12)):
         for certify in (False, True):
             m = stability_margins(control.tf([k], [1, 2, 1, 0]), certify=certify)
-            answers.append((m.verdict, m.evidence == "withheld", m.agreement.border_poles))
-            if m.verdict == "on the border":
+            answers.append((m.verdict, m.evidence == "withheld", m.agreement.poles_at_limit))
+            if m.verdict == "at the stability limit":
                 assert (m.stable, m.modulus_margin) == (False, pytest.approx(0.0, abs=1e-9))
-    assert answers[:2] == [("on the border", False, 2)] * 2
+    assert answers[:2] == [("at the stability limit", False, 2)] * 2
     assert answers[2:6] == [("undecided", True, 0)] * 4
     assert answers[6:] == [("unstable", False, 0)] * 2 + [("stable", False, 0)] * 2
 
@@ -162,7 +162,7 @@ def test_a_loop_that_is_unstable_in_any_case_is_said_to_be(k: float) -> None:
         m = stability_margins(loop, certify=certify)
         assert (m.verdict, m.evidence) == ("unstable", "certified")
         assert difference(m, truth_of(loop)) is None
-        told = {truth_of(near).unstable for near in (loop, towards_the_border(loop))}
+        told = {truth_of(near).unstable for near in (loop, towards_the_limit(loop))}
         assert len(told) == 2  # how many there are the data do not determine
 
 

@@ -199,12 +199,12 @@ def test_circles_of_repeats_hold_the_truth_as_often_as_they_say(n: int) -> None:
 
 
 @pytest.mark.parametrize("n", [2, 3, 10])
-@pytest.mark.parametrize("alike", [False, True])
-def test_circles_of_few_repeats_hold_the_truth_in_an_antiresonance(n: int, alike: bool) -> None:
+@pytest.mark.parametrize("equal", [False, True])
+def test_circles_of_few_repeats_hold_the_truth_in_an_antiresonance(n: int, equal: bool) -> None:
     """Noise as large everywhere, or over L; two repeats judged alone make circles of 8.3 deviations."""
     rng, omega = np.random.default_rng(n), np.geomspace(1.0, 300.0, 60)
     L = 50.0 / (1j * omega) * (1.0 + 0.04 * 1j * omega / 20.0 - (omega / 20.0) ** 2)
-    deviation = 0.3 * np.ones(60) if alike else 0.02 * np.abs(L)
+    deviation = 0.3 * np.ones(60) if equal else 0.02 * np.abs(L)
     held, low = [], np.argsort(np.abs(L))[:6]
     for _ in range(100):
         values = L + deviation * circular(rng, (n, 60))

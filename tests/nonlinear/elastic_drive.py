@@ -58,10 +58,10 @@ def stribeck(*points: tuple[float, float], direction: Any = "both") -> tuple[mod
 
 @dataclass
 class Run:
-    """States (i, w, W, th, phi) and ledgers at the ticks, events in each, how it ended."""
+    """States (i, w, W, th, phi) and balances at the ticks, events in each, how it ended."""
 
     states: np.ndarray
-    ledgers: np.ndarray
+    balances: np.ndarray
     events: list[int]
     status: int
 
@@ -99,18 +99,18 @@ def run_plant(
     p, s = parameters(open_drive(design, start, fraction_s, **options))
     io, count = np.zeros(layout.IO_SIZE), voltages.size
     moment = np.broadcast_to(moments, voltages.shape)
-    states, ledgers = np.empty((count + 1, 5)), np.empty((count + 1, layout.ENERGY_SIZE))
+    states, balances = np.empty((count + 1, 5)), np.empty((count + 1, layout.ENERGY_SIZE))
     events, status = [], layout.OK
     for k in range(count + 1):
         states[k, :4], states[k, 4] = s[list(PLACES)], s[layout.S_OUTPUT] * design.ratio_behind_coupling
-        ledgers[k] = s[layout.S_ENERGY : layout.S_ENERGY + layout.ENERGY_SIZE]
+        balances[k] = s[layout.S_ENERGY : layout.S_ENERGY + layout.ENERGY_SIZE]
         io[layout.IN_COMMAND], io[layout.IN_LOAD] = (voltages[k], moment[k]) if k < count else (0.0, 0.0)
         before = s[layout.S_EVENTS]
         status = tick(p, s, io)
         if status != layout.OK:
             break
         events.append(int(s[layout.S_EVENTS] - before))
-    return Run(states, ledgers, events[:count], status)
+    return Run(states, balances, events[:count], status)
 
 
 def power_of_ten(rng: np.random.Generator, low: float, high: float) -> float:

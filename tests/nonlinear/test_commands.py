@@ -48,7 +48,7 @@ def test_values(command: Command, expected: np.ndarray) -> None:
 def test_any_command_may_be_a_load() -> None:
     fin, t = load_design("fin"), np.arange(400) * load_design("fin").controller.period_s
     given = (
-        loads.LoadMoment(series=commands.sine(20.0, 30.0)),
+        loads.LoadTorque(series=commands.sine(20.0, 30.0)),
         loads.series(t, 20.0 * np.sin(60.0 * np.pi * t)),
     )
     one, other = (simulate(fin, commands.hold(), t.size * fin.controller.period_s, load) for load in given)

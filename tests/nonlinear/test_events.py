@@ -242,7 +242,7 @@ def test_damped_contact_parts_at_no_torque() -> None:
     rate = -K * x / c
     parting = 0.5 * K * x * x
     damped = 0.5 * REDUCED * (v * v - rate * rate) - parting
-    assert run.ledgers[90, layout.ENERGY_DAMPING :][:2] == pytest.approx([damped, parting], rel=1e-10)
+    assert run.balances[90, layout.ENERGY_DAMPING :][:2] == pytest.approx([damped, parting], rel=1e-10)
     assert run.states[90, 1] / N - run.states[90, 2] == pytest.approx(rate, rel=1e-11)
 
 
@@ -269,11 +269,11 @@ def stored(design: Design, x: np.ndarray) -> float:
 
 @pytest.mark.parametrize("seed", range(60))
 def test_balance_passivity_and_the_same_motion_without(seed: int) -> None:
-    """The short way and the ledger's way walk the same segments differently."""
+    """The short way and the balance's way walk the same segments differently."""
     design, voltages, moments, fraction = random_drive(seed)
     run = run_plant(design, voltages, moments, fraction_s=fraction, WITH_ENERGY=1.0)
     assert run.status == layout.OK
-    e = run.ledgers
+    e = run.balances
     change = np.array([stored(design, x) for x in run.states])
     largest = max(np.abs(e).max(), change.max())
     error = e[:, layout.ENERGY_INPUT] - change - e[:, SPENT].sum(axis=1)

@@ -281,9 +281,9 @@ def test_all_who_ask_get_one_answer(seed: int, monkeypatch: pytest.MonkeyPatch) 
     monkeypatch.setattr(sys.modules["analyses.validation.validate"], "conditional_stability", lambda *_: None)
     monkeypatch.setattr(sys.modules["analyses.failures.run"], "_reaches", lambda *_: False)
     waited, checked = limit_cycles(design), validate(design, QUICK)
-    assert checked.settlings == waited.rests
+    assert checked.settlings == waited.settlings
     assert (waited.verdict, waited.hunting) == (checked.rest, checked.hunting)
-    ends_alike(design, waited.rests, 1_000, 20_000)
+    ends_alike(design, waited.settlings, 1_000, 20_000)
     ends_alike(design, failures(design, Asked.of(design)).before, 20_000)
     swing, said = waited.hunting, (summary(waited), checked.words)
     if swing is None:

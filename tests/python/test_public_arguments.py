@@ -83,7 +83,7 @@ PUBLIC = {
     "nonlinear": "Drive Probe Reducers Run State simulate simulate_many tangent",
     "nonlinear.commands": "chirp hold multisine ramp recorded sampled sine step stepped_sine triangle",
     "nonlinear.export": "c_export controller_export refuse_unknown",
-    "nonlinear.loads": "LoadMoment constant proportional series",
+    "nonlinear.loads": "LoadTorque constant proportional series",
     "analyses": "amplitude_map compare correlate_record evaluate_requirements identify_campaign sawtooth "
     "import_campaign large_signals load_campaign load_study open_record survey_loops tune validate",
     "analyses.corners": "Asked corners worst_of",
@@ -95,7 +95,8 @@ PUBLIC = {
     "analyses.monte_carlo": "MonteCarloSettings SampleTask StepCheck monte_carlo replay",
     "analyses.motion": "Asked motion",
     "analyses.specification": "specification",
-    "analyses.stiffness": "check_stiffness lost_motion_seen stiffness stiffness_at_rest stiffness_curves",
+    "analyses.stiffness": "check_stiffness lost_motion_simulated stiffness stiffness_at_rest "
+    "stiffness_curves",
     "analyses.tuning": "TuningSettings",
     "analyses.validation": "Asked Settings",
     "reports": "report",
@@ -117,7 +118,8 @@ SMALLER = {  # a design for which they answer, or sooner than for ilr33-amber
     for design, names in (
         (SMALL, "assemble_loops plant write_design evaluate_requirements survey_loops tune validate corners "
         "limit_cycles margins report"),
-        (FIN, "duty failures check_stiffness lost_motion_seen stiffness stiffness_at_rest stiffness_curves"),
+        (FIN, "duty failures check_stiffness lost_motion_simulated stiffness stiffness_at_rest "
+        "stiffness_curves"),
     )
     for name in names.split()
 }  # fmt: skip
@@ -196,7 +198,7 @@ USED = {  # what is asked with a request
     ),
     "nonlinear.Run": lambda made: nonlinear.simulate_many([made]),
     "nonlinear.State": lambda made: simulate(AMBER, STEP, 0.01, initial=made),
-    "nonlinear.loads.LoadMoment": lambda made: simulate(AMBER, STEP, 0.01, made),
+    "nonlinear.loads.LoadTorque": lambda made: simulate(AMBER, STEP, 0.01, made),
     "actuator_lti.batch.Population": linear_figures,
     "analyses.monte_carlo.SampleTask": lambda made: made((0, 2)),
     "analyses.monte_carlo.StepCheck": lambda made: SampleTask(AMBER, sampler_of(AMBER, seed=0), step=made),

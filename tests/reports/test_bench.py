@@ -103,7 +103,7 @@ def test_a_limit_that_acts_is_shaded_where_it_acts(page: Page) -> None:
 
 def test_a_click_on_the_map_plays_that_sine(page: Page) -> None:
     ask(page, "step", Duration=0.0)
-    page.settled(lambda: page.mouse.click(*page.spot('[data-chart="border"] .plot', 0.35, 0.4)))
+    page.settled(lambda: page.mouse.click(*page.spot('[data-chart="linear-limit"] .plot', 0.35, 0.4)))
     assert page.input_value(".run-kind") == "sine"
     trial = page.evaluate(
         "() => Object.fromEntries([...document.querySelectorAll('.run-keys label')]"

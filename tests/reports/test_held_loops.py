@@ -75,7 +75,10 @@ def test_the_current_loop_is_judged_with_the_rotor_held() -> None:
     design = pushed(controller={"computing_delay_s": 0.0})
     figures = all_loop_figures(assemble_loops(design))
     current, expected = figures["current"], held_phase_margin_deg(design)
-    assert (current.margins.stable, current.sound) == (False, True)  # J s^2 + Cv s - k: a root on the right
+    assert (current.margins.stable, current.is_stable) == (
+        False,
+        True,
+    )  # J s^2 + Cv s - k: a root on the right
     assert figures["position"].stable
     # without a load that pushes, an unstable current loop inside a stable drive stays what it is
     own = all_loop_figures(assemble_loops(overfed()))
@@ -111,7 +114,7 @@ def test_a_drive_that_its_load_drives_away_is_judged_as_it_is() -> None:
     for share, stable in ((0.98, True), (1.02, False)):
         figures = all_loop_figures(assemble_loops(p_velocity(share * limit)))
         assert figures["position"].margins.stable is stable
-        assert {figures[name].sound for name in ("current", "velocity")} == {stable}
+        assert {figures[name].is_stable for name in ("current", "velocity")} == {stable}
 
 
 @pytest.mark.parametrize(("design", "held", "verdict"), [
@@ -138,7 +141,7 @@ def test_many_designs_at_once_are_judged_alike() -> None:
         for k, slope in enumerate(slopes):
             single = all_loop_figures(assemble_loops(make(float(slope))))
             for name, one in single.items():
-                assert many.stable(name)[k] == one.sound
+                assert many.stable(name)[k] == one.is_stable
                 for quantity in ("phase_margin_deg", "gain_margin_db"):
                     value = getattr(one.judged.margins, quantity)
                     found = many.quantity(quantity.rpartition("_")[0], name)[k]

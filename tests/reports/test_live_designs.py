@@ -34,7 +34,7 @@ WHOLE_DRIVE = tuple(
                 maximum=9.0 if low is None else None)
     for k, (name, unit, low, load) in enumerate(ASKED)
 )  # fmt: skip
-CHARTS = ["bode", "nyquist", "sensitivity", "step", "run", "border", "difference"]
+CHARTS = ["bode", "nyquist", "sensitivity", "step", "run", "linear-limit", "difference"]
 EVERY = Requirement(id="pm", quantity="phase_margin", unit="deg", loop="every", minimum=10.0)
 CURVE = ((0.0, 3e-3), (40.0, 2e-3), (900.0, 4e-3))
 POINTS = tuple(FrictionPoint(speed_rad_s=speed, torque_Nm=torque) for speed, torque in CURVE)
@@ -182,7 +182,7 @@ def test_cells_of_the_map_are_named_as_the_command_line_names_them(opens, tmp_pa
     """Every cell again, as a sine from rest, by the simulator and the rule of the large-signal map."""
     design = load_design(name)
     page = opens(design)
-    page.locator('[data-chart="border"]').scroll_into_view_if_needed()
+    page.locator('[data-chart="linear-limit"]').scroll_into_view_if_needed()
     page.wait_for_selector("#hands-on[data-cells^='[[']")
     page.done(60_000)
     cells = json.loads(page.get_attribute("#hands-on", "data-cells") or "[]")

@@ -123,7 +123,7 @@ def test_the_json_of_a_result_is_its_fields_and_properties() -> None:
     assert set(told) == {field.name for field in fields(Stiffness)} | derived
     assert told["design"] == {"name": "emps", "hash": design_hash(design)}
     own, seen = told["checks"][0], result.checks[0]
-    size, phase_deg = (own["foreseen_Nm_rad"][key] for key in ("size", "phase_deg"))
-    assert cmath.rect(size, radians(phase_deg)) == pytest.approx(seen.foreseen_Nm_rad, rel=1e-12)
+    size, phase_deg = (own["predicted_Nm_rad"][key] for key in ("size", "phase_deg"))
+    assert cmath.rect(size, radians(phase_deg)) == pytest.approx(seen.predicted_Nm_rad, rel=1e-12)
     assert own["difference"] == seen.difference
     json.dumps(told, allow_nan=False)

@@ -84,7 +84,7 @@ def test_a_picture_has_ink_on_paper(page: Page, tmp_path: Path) -> None:
 def test_a_legend_names_no_curve_that_is_not_there_and_a_double_click_selects_no_text(page: Page) -> None:
     shown = page.locator('[data-chart="run"] .keys li:visible').all_inner_texts()
     assert shown == ["command", "as designed", "as changed"]  # no record was dropped
-    border = page.locator('[data-chart="border"]')
+    border = page.locator('[data-chart="linear-limit"]')
     drawn = border.locator("path.curve").evaluate_all("all => all.filter(p => p.getAttribute('d')).length")
     assert border.locator(".keys li:visible").count() == drawn < border.locator(".keys li").count()
     chart = page.locator("#answer .chart").first

@@ -15,7 +15,7 @@ from analyses.specification.capability import drive_figures
 from analyses.specification.requirements import evaluate_requirements
 from analyses.specification.sensitivity import sensitivities
 from analyses.studies.study import Study, Variant, load_study, study_of, study_or_design
-from reports.sections.compare import batches, brief, ledger, section
+from reports.sections.compare import batches, brief, predictions, section
 from reports.sections.compare_best import section as best_section
 from reports.sections.compare_figures import tornadoes
 from reports.verdict_summary import walk
@@ -202,7 +202,7 @@ def test_one_page_says_which_variant_is_best_for_what_and_what_it_gives_up(compa
     assert next(row for row in designs if row["design"] == "slower gear")["_status"] == "fail"
     rate = next(row for row in best if row["what"].startswith("Drive: output rate"))
     assert rate["worst"].startswith("slower gear")
-    assert rate["best"] == "ilr33-amber; 3 alike"  # a difference that no digit shows makes none the best
+    assert rate["best"] == "ilr33-amber; 3 equal"  # a difference that no digit shows makes none the best
 
 
 def test_slopes_are_those_of_closed_forms_and_boxes_lie_about_the_value_of_the_design():
@@ -294,12 +294,12 @@ def test_the_checks_of_every_design_stands_side_by_side(tmp_path):
     path = study(tmp_path, '[[variant]]\nname = "faster"\n' + change)
     result = compare(load_study(path), validation=True)
     assert len(result.base.checks) == len(result.variants[0].checks) > 20
-    (made,) = ledger(result)
+    (made,) = predictions(result)
     assert made["status"] == "pass"
     first = made["blocks"][0]
     assert [column["label"] for column in first["columns"]] == ["Prediction", "Unit", "ilr33-amber", "faster"]
     assert first["rows"][0]["d0"]["status"] == first["rows"][0]["d1"]["status"] == "pass"
-    assert ledger(compare(study_of(load_design("ilr33-amber")))) == []
+    assert predictions(compare(study_of(load_design("ilr33-amber")))) == []
 
 
 def test_the_printed_example_is_a_study_and_23_s_stand_in_a_row_of_seconds(cli, tmp_path):

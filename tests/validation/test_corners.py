@@ -87,14 +87,16 @@ def test_command_and_section(cli) -> None:
     fails = "The drive fails at 3 of 7 corners (cold; worst gain margin; worst phase margin): "
     assert words.startswith(fails)
     failed = Counter(v["id"] for c in told.values() for v in c["verdicts"] if not v["passes"])
-    failed["position loop not stable"] = sum(not c.figures["position"].sound for c in fin.corners)
+    failed["position loop not stable"] = sum(not c.figures["position"].is_stable for c in fin.corners)
     named = words.rstrip(".").partition("): ")[2].split(", ")
     assert {*named} == {f"{name} at {count}" for name, count in failed.items()}
     panels = [column.panels[0] for column in chart(fin).columns]
     limits = [[item.at for item in panel.items if item.kind == "rule" and item.label] for panel in panels]
     assert limits == [[6.0], [45.0]]
     seen = [item.words for panel in panels for item in panel.items if item.kind == "note"]
-    assert seen == ["not stable"] * 2 * sum(not one.sound for c in fin.corners for one in c.figures.values())
+    assert seen == ["not stable"] * 2 * sum(
+        not one.is_stable for c in fin.corners for one in c.figures.values()
+    )
     between = "allowed: above -273.15 and below 1000 degC"
     for asked, allowed in (
         (("--hot", "-60"), "hot -60 degC: must be above cold, -40 degC"),

@@ -179,7 +179,7 @@ def test_hunting_needs_breakaway_above_sliding_friction(breakaway: float, hunts:
     values = {"friction.breakaway_ratio": breakaway, "control.velocity.integral_time": 3e-3}
     design = with_values(AMBER, {**values, "control.position.gain": 250.0})
     cycles = limit_cycles(design, 0.0)
-    assert cycles.confirmations == ()
+    assert cycles.cycles == ()
     assert (cycles.hunting is not None) == hunts
     assert cycles.described == (not hunts)
     if cycles.hunting is not None:
@@ -190,9 +190,9 @@ def test_hunting_needs_breakaway_above_sliding_friction(breakaway: float, hunts:
 
 
 @pytest.mark.parametrize("load", [0.0, 8.0])
-def test_friction_keeps_an_unstable_loop_quiet_up_to_the_foreseen_amplitude(load: float) -> None:
+def test_friction_keeps_an_unstable_loop_quiet_up_to_the_predicted_amplitude(load: float) -> None:
     """Speed gain beyond its margin: small motion dies out, large grows; border to 15 %, frequency to 8 %."""
-    (item,) = limit_cycles(with_values(AMBER, {"control.velocity.gain": 3.0}), load).confirmations
+    (item,) = limit_cycles(with_values(AMBER, {"control.velocity.gain": 3.0}), load).cycles
     assert not item.cycle.stable
     assert item.verdict == "confirmed"
     assert item.ratio == pytest.approx(1.0, rel=0.15)
@@ -221,7 +221,7 @@ HUNTING = {
 
 
 @pytest.mark.parametrize("name", HUNTING)
-def test_stick_slip_is_foreseen(name: str) -> None:
+def test_stick_slip_is_predicted(name: str) -> None:
     """Breakaway 1.5, whatever winds up, by up to 6e-3 in a tick; also where larger steps slide to rest."""
     design = quiet(HUNTING[name])
     cycles = friction_effects(design).points[-1].cycles

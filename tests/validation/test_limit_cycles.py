@@ -15,7 +15,7 @@ from actuator_lti.drive.operating import dead_zone
 from analyses.limit_cycles import LimitCycles, describing, limit_cycles
 from analyses.limit_cycles.counts import Counts, counted_gain, counts_of, linear_ratio
 from analyses.limit_cycles.describing import Cycle, cycles_of_play, cycles_of_quantisation
-from analyses.limit_cycles.run import Confirmation, confirm
+from analyses.limit_cycles.run import CycleResult, confirm
 from nonlinear import Rows, commands, simulate
 from reports.certain import certain
 from reports.sections.beyond import counts as counts_section
@@ -98,7 +98,7 @@ def test_below_the_linear_amplitude_the_simulator_is_off_and_beyond_it_is_not() 
     found = of_difference(1024)
     assert found.off[0] > 0.3
     assert (found.off[2:] < 0.05).all()
-    assert found.linear_seen_rad == pytest.approx(found.linear_rad)
+    assert found.linear_simulated_rad == pytest.approx(found.linear_rad)
 
 
 def test_a_small_cycle_keeps_its_digits_in_a_document() -> None:
@@ -115,7 +115,7 @@ def test_a_drive_that_only_friction_holds_has_no_linear_amplitude() -> None:
     """Seed 40018: without friction its response grows without bound; NaN was compared with NaN."""
     design = full_drive(40018)
     found = counts_of(design, assemble_loops(design))
-    assert all(np.isinf(one.off).all() and one.linear_seen_rad is None for one in found)
+    assert all(np.isinf(one.off).all() and one.linear_simulated_rad is None for one in found)
 
 
 @pytest.mark.parametrize("x", [0.01, 0.3, 0.7, 0.99])
@@ -170,8 +170,8 @@ def test_a_count_makes_a_cycle_at_the_gain_border_of_the_loop() -> None:
 def test_a_drive_with_too_much_gain_hunts_and_says_so(cli) -> None:
     changes = ["--set", "control.position.gain=300 1/s"]
     told = cli.data("cycles", "fin", *changes, status=1)
-    assert any(one["hunting"] for one in told["rests"])
-    border = next(one for one in told["confirmations"] if one["cycle"]["with_friction"])
+    assert any(one["hunting"] for one in told["settlings"])
+    border = next(one for one in told["cycles"] if one["cycle"]["with_friction"])
     assert not border["cycle"]["stable"]
     assert border["ratio"] == pytest.approx(1.0, rel=0.15)
 
@@ -196,7 +196,7 @@ def test_section_and_refusal() -> None:
 ])  # fmt: skip
 def test_confirmed_is_a_cycle_of_about_the_predicted_size_and_frequency(ratio, hertz, verdict) -> None:
     cycle = Cycle("play", False, 1e-3, 1e-3, 10.0, True, {})
-    assert Confirmation(cycle, ratio, hertz).verdict == verdict
+    assert CycleResult(cycle, ratio, hertz).verdict == verdict
 
 
 def test_a_cycle_of_an_hour_is_told_and_not_tried() -> None:

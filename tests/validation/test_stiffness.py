@@ -18,7 +18,7 @@ from actuator_lti.drive.facts import resonance_rad_s
 from actuator_lti.loops import assemble_loops
 from actuator_lti.loops.stiffness import compliance, lost_motion_rad, stiffness_at
 from analyses.stiffness import check_stiffness, stiffness, stiffness_at_rest, stiffness_curves
-from analyses.stiffness.run import lost_motion_seen
+from analyses.stiffness.run import lost_motion_simulated
 from nonlinear import commands, simulate
 from nonlinear.loads import series
 from reports.charts.svg import draw_svg
@@ -36,8 +36,8 @@ def test_k4_by_the_loops_and_by_the_simulator() -> None:
     loops = assemble_loops(drive_e())
     for (frequency, size, angle), check in zip(K4, checks, strict=True):
         K = stiffness_at(compliance(drive_e()), frequency)[0]
-        of_loops = 1 / loops.moment_to_output(np.exp(2j * np.pi * frequency * 2e-4))
-        for found, within in ((K, 1e-10), (of_loops, 1e-10), (check.seen_Nm_rad, 1e-9)):
+        of_loops = 1 / loops.load_torque_to_output(np.exp(2j * np.pi * frequency * 2e-4))
+        for found, within in ((K, 1e-10), (of_loops, 1e-10), (check.simulated_Nm_rad, 1e-9)):
             assert abs(found) == pytest.approx(size, rel=within)
             assert np.angle(found, deg=True) == pytest.approx(angle, abs=1e-7)
 
@@ -67,7 +67,7 @@ def test_the_simulator_checks_the_stiffness_that_is_quoted(efficiency: float, de
     for check in checks:
         curve = powered[ways.index(check.way)]
         at = np.interp(check.frequency_hz, curve.frequency_hz, abs(curve.stiffness_Nm_rad))
-        assert abs(check.seen_Nm_rad) == pytest.approx(at, rel=1e-3)  # the curve is drawn at points
+        assert abs(check.simulated_Nm_rad) == pytest.approx(at, rel=1e-3)  # the curve is drawn at points
         assert check.difference < 1e-8
     least = min(curve.least[0] for curve in powered)
     assert drive_figure(design, "least_stiffness") == pytest.approx(least, rel=1e-9)
@@ -111,9 +111,11 @@ def test_an_integral_on_the_output_comes_back_and_a_self_locking_gear_does_not_m
     rigid = stiffness(load_design("ilr33-amber"))
     assert all(curve.static_Nm_rad == float("inf") for curve in rigid.curves)
     assert rigid.lost_motion is None
-    assert [check.seen_Nm_rad for check in rigid.checks] == 3 * [complex(np.inf)]  # pushed, and not moved
+    assert [check.simulated_Nm_rad for check in rigid.checks] == 3 * [
+        complex(np.inf)
+    ]  # pushed, and not moved
     assert rigid.verdict == "met"
-    moved = replace(rigid.checks[0], seen_Nm_rad=1e9 + 0j)
+    moved = replace(rigid.checks[0], simulated_Nm_rad=1e9 + 0j)
     assert replace(rigid, checks=(moved,)).verdict == "not met"
     compliant = stiffness_curves(COMPLIANT)[0]
     assert compliant.static_Nm_rad == pytest.approx(1500.0, rel=1e-6)  # the shaft behind the worm
@@ -125,7 +127,7 @@ def test_the_simulator_confirms_every_shipped_design(name: str) -> None:
     assert len(result.checks) == 3 * len({one.way for one in result.curves if one.state == "powered"})
     assert max(check.difference for check in result.checks) < 1e-6
     assert result.passed
-    wrong = replace(result.checks[0], foreseen_Nm_rad=1.00001 * result.checks[0].foreseen_Nm_rad)
+    wrong = replace(result.checks[0], predicted_Nm_rad=1.00001 * result.checks[0].predicted_Nm_rad)
     assert not replace(result, checks=(wrong,)).passed
 
 
@@ -140,10 +142,10 @@ def test_lost_motion_is_read_at_3_percent_of_the_rated_moment(play: float, dry: 
     expected = play + 2 * 0.36 / 800.0
     assert lost_motion_rad(design) == pytest.approx(expected, rel=1e-12)
     assert drive_figure(design, "lost_motion") == pytest.approx(np.degrees(expected), rel=1e-12)
-    assert lost_motion_seen(design) == pytest.approx(expected, rel=1e-6)
+    assert lost_motion_simulated(design) == pytest.approx(expected, rel=1e-6)
     heavy = changed(COMPLIANT, load={"friction": {"dry_torque_Nm": 40.0 * dry}})  # the worm's, 0.8 to 20 N m
     expected = 1e-3 + 2 * 0.03 * heavy.load.moment_max_Nm / heavy.coupling.stiffness_Nm_rad
-    assert lost_motion_seen(heavy) == pytest.approx(expected, rel=1e-9)
+    assert lost_motion_simulated(heavy) == pytest.approx(expected, rel=1e-9)
 
 
 @pytest.mark.parametrize("moment", [0.5, 2.0, 8.0])
@@ -151,7 +153,7 @@ def test_at_rest_play_softens_small_moments(moment: float) -> None:
     """A held motor, no friction: deflection b sgn(M) + M/k, so 1/K = 1/k + 4 b/(pi M) of the fundamental."""
     (result,) = stiffness_at_rest(changed(COMPLIANT, load={"friction": None}), [(0.5, moment)])
     by_hand = 1.0 / (1.0 / 1500.0 + 4 * 0.5e-3 / (np.pi * moment))
-    assert abs(result.seen_Nm_rad) == pytest.approx(by_hand, rel=0.01)
+    assert abs(result.simulated_Nm_rad) == pytest.approx(by_hand, rel=0.01)
 
 
 def test_at_rest_a_slow_integral_is_waited_for() -> None:
@@ -162,7 +164,7 @@ def test_at_rest_a_slow_integral_is_waited_for() -> None:
         load_design("joint"), friction=smooth, load=bare, encoder=uncounted, output_encoder=uncounted
     )
     (result,), (check,) = stiffness_at_rest(design, [(20.0, 1.0)]), check_stiffness(design, (20.0,))
-    assert result.seen_Nm_rad == pytest.approx(check.foreseen_Nm_rad, rel=1e-4)
+    assert result.simulated_Nm_rad == pytest.approx(check.predicted_Nm_rad, rel=1e-4)
 
 
 def test_at_rest_a_drive_that_hunts_has_no_stiffness_of_its_own() -> None:
@@ -174,8 +176,8 @@ def test_at_rest_a_drive_that_hunts_has_no_stiffness_of_its_own() -> None:
         load = series(t, moment * np.sin(4.0 * np.pi * t))
         y = simulate(design, commands.hold(), t.size * design.controller.period_s, load).output_angle_rad
         seen = np.abs((y.reshape(20, -1) @ np.exp(-2j * np.pi * np.arange(8000) / 8000))[-4:])
-        assert np.isnan(found.seen_Nm_rad) == (np.ptp(seen) > 0.02 * seen.max())
-    assert np.isnan(hunts.seen_Nm_rad)
+        assert np.isnan(found.simulated_Nm_rad) == (np.ptp(seen) > 0.02 * seen.max())
+    assert np.isnan(hunts.simulated_Nm_rad)
 
 
 @pytest.mark.parametrize("mass", [0.0, 1.0])
@@ -183,7 +185,7 @@ def test_at_rest_dry_friction_holds_a_small_moment(mass: float) -> None:
     """Less than the load's dry friction, 0.05 N m, moves it neither in the gap nor bent by a weight."""
     weight = Gravity(mass_kg=mass, arm_m=0.3, offset_rad=np.pi / 2) if mass else None
     (result,) = stiffness_at_rest(changed(COMPLIANT, load={"gravity": weight}), [(2.0, 0.04)])
-    assert result.seen_Nm_rad == complex(np.inf)
+    assert result.simulated_Nm_rad == complex(np.inf)
 
 
 def test_command_section_and_figure(cli) -> None:

@@ -10,7 +10,6 @@ from actuator_lti.margins.delays.axis import IMAGINARY, NOWHERE, Axis, Form, sma
 from actuator_lti.margins.delays.exact import ExactDelayLoop
 from actuator_lti.margins.distances import DISK, MODULUS, Distance, Place
 from actuator_lti.margins.exact.decided import ACROSS, Crossings, Shared, hidden_notes, shared
-from actuator_lti.margins.given import ULP
 from actuator_lti.margins.results import StabilityMargins
 from actuator_lti.margins.single import Agreement
 from actuator_lti.margins.tail import listed, tail_note
@@ -22,7 +21,7 @@ _FLOOR = 0.01  # gain: margins are listed up to where L stays below
 _BELOW = 1.0 - 1e-12
 _AT_REST = 1e-3  # how far L has moved from its value at rest where a crossover is one of its own
 _METHOD = "zeros of real functions of the axis, parted by intervals in certified arithmetic"
-_REASON = f"certified intervals on the exact delays; {ULP} ulp of the entries change nothing"
+_REASON = "certified intervals on the exact delays; rounding of the entries changes nothing"
 
 
 def certified_delayed_margins(
@@ -61,7 +60,7 @@ def certified_delayed_margins(
         delay_s=delay_s,
         listed_to=listed_to,
         band_rad_s=band,
-        hidden_border=hidden.on_border,
+        hidden_at_limit=hidden.at_limit,
     )
 
 

@@ -1,4 +1,4 @@
-"""What the data decide: the crossings that neighbours 8 ulp away share with them, and what is said of it."""
+"""What double precision resolves: the crossings that neighbours 8 ulp away share, and what is said of it."""
 
 import math
 from bisect import bisect_left
@@ -8,9 +8,9 @@ from operator import attrgetter
 
 from actuator_lti.margins.assemble import Crossing
 from actuator_lti.margins.exact.roots import HalfPlanes
-from actuator_lti.margins.given import ULP
 
-ACROSS = f"{ULP} ulp of the entries move a closed-loop pole across the stability boundary"
+UNRESOLVED = "not resolved in double precision: "
+ACROSS = f"{UNRESOLVED}on which side of the stability limit a closed-loop pole lies"
 _MOVED = 1e-9
 _FAR_DB = 30.0
 _FAR = 10.0 ** (_FAR_DB / 20.0)  # a real-axis crossing farther from -1 than this is of no consequence
@@ -23,7 +23,7 @@ Lists = tuple[Crossings, Crossings]  # of the unit circle and of the negative re
 
 @dataclass(frozen=True)
 class Shared:
-    """The crossings that the data determine."""
+    """The crossings that double precision resolves."""
 
     gains: Crossings
     reals: Crossings
@@ -33,8 +33,8 @@ class Shared:
 
     @property
     def moved_text(self) -> str:
-        what = f"move a crossing by {self.moved:.1g}" if self.moved > _MOVED else "change nothing"
-        return f"{ULP} ulp of the entries {what}"
+        what = f"moves a crossing by {self.moved:.1g}" if self.moved > _MOVED else "changes nothing"
+        return f"rounding of the entries {what}"
 
     @property
     def notes(self) -> tuple[str, ...]:
@@ -71,14 +71,14 @@ def _partner(c: Crossing, others: Crossings) -> Crossing | None:
     beside = takewhile(lambda other: other.w <= c.w * (1.0 + _SAME_W), islice(others, first, None))
     for other in beside:
         a, b = abs(c.L), abs(other.L)
-        alike = a == b or (min(a, b) > 0.0 and abs(math.log(a / b)) < _SAME_GAIN)
-        if alike and c.touch == other.touch:
+        same = a == b or (min(a, b) > 0.0 and abs(math.log(a / b)) < _SAME_GAIN)
+        if same and c.touch == other.touch:
             return other
     return None
 
 
 def _difference(ours: Crossings, theirs: Crossings, line: str) -> str | None:
-    """Why two lists do not tell of the same crossings, those far from -1 left out."""
+    """Why two lists do not hold the same crossings, those far from -1 left out."""
     core, their_core = [c for c in ours if not _far(c)], [c for c in theirs if not _far(c)]
     if [c.touch for c in core] == [c.touch for c in their_core]:
         return None
@@ -86,7 +86,7 @@ def _difference(ours: Crossings, theirs: Crossings, line: str) -> str | None:
     alone += [c for c in their_core if _partner(c, ours) is None]
     if not alone:
         return None
-    return f"{ULP} ulp of the entries decide whether L meets {line} at w = {alone[0].w:.6g} of the s-plane"
+    return f"{UNRESOLVED}whether L meets {line} at w = {alone[0].w:.6g} of the s-plane"
 
 
 def _movement(c: Crossing, others: Crossings) -> float:
@@ -100,15 +100,15 @@ def _movement(c: Crossing, others: Crossings) -> float:
 
 def hidden_notes(hidden: HalfPlanes) -> tuple[str, ...]:
     """What is said of modes that the loop neither drives nor sees."""
-    at_zero, border, right, notes = hidden.at_zero, hidden.border, hidden.right, []
-    if at_zero == 1 and not border:
+    at_zero, undamped, right, notes = hidden.at_zero, hidden.undamped, hidden.right, []
+    if at_zero == 1 and not undamped:
         notes.append(
             "one mode at zero frequency that the loop neither drives nor sees is left out "
             "(it is no instability)"
         )
-    elif at_zero or border:
+    elif at_zero or undamped:
         at = [f"{at_zero} at zero frequency"] if at_zero else []
-        pairs = ", ".join(f"{times} pair{'s' * (times > 1)} at {float(w.mid()):.6g}" for w, times in border)
+        pairs = ", ".join(f"{times} pair{'s' * (times > 1)} at {float(w.mid()):.6g}" for w, times in undamped)
         notes.append(
             f"modes on the stability boundary that the loop neither drives nor sees are left out "
             f"({', '.join([*at, pairs] if pairs else at)} of the s-plane): the margins are those of what is "

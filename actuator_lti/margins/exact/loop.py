@@ -58,9 +58,9 @@ class ExactLoop:
         return self.closed_poles.right + self.hidden_modes.right
 
     @property
-    def on_border(self) -> int:
-        """Closed-loop poles exactly on the border, hidden modes left out."""
-        return self.closed_poles.on_border + self.closed_at_end
+    def at_limit(self) -> int:
+        """Closed-loop poles exactly at the stability limit, hidden modes left out."""
+        return self.closed_poles.at_limit + self.closed_at_end
 
     @property
     def hidden_at_end(self) -> int:
@@ -73,13 +73,14 @@ class ExactLoop:
         return self.N[self.degree], self.D[self.degree]
 
 
-def neighbours(given: Given, loop: ExactLoop, told: int = 1) -> list[ExactLoop]:
+def neighbours(given: Given, loop: ExactLoop, placed: int = 1) -> list[ExactLoop]:
     """The same from data 8 ulp away.
 
-    Where more modes on the border cancel exactly than are ``told`` by their place, what is seen is moved and
-    they stay: data next to these would have a pole beside a zero there, and nothing in common with the loop.
+    Where more modes at the stability limit cancel exactly than their place shows (``placed``), what is seen
+    is moved and they stay: data next to these would have a pole beside a zero there, and nothing in common
+    with the loop.
     """
-    if loop.hidden_modes.on_border <= told and not loop.hidden_at_end:
+    if loop.hidden_modes.at_limit <= placed and not loop.hidden_at_end:
         return [exact_loop(near) for near in given.neighbours()]
     return [replace(loop, N=_moved(loop.N, way), D=_moved(loop.D, way)) for way in (1, -1)]
 

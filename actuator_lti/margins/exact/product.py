@@ -64,7 +64,7 @@ def late_margins(given: Given, delay_s: float, band: tuple[float, float] | None)
         if loop.N.degree() < 0:  # nothing is fed back, early or late
             return replace(certified_margins(given, band), delay_s=delay_s)
         delays = (delay_s + way * ULP * float(np.spacing(delay_s)) for way in (0.0, 1.0, -1.0))
-        near = (loop, *neighbours(given, loop, told=0))
+        near = (loop, *neighbours(given, loop, placed=0))
         one = len({_above_one(each) for each in near}) > 1 or _above_one(loop) == 0
         pairs = zip(near, delays, strict=True)
         base, *others = [_found(each, given.period_s, delay, band, one) for each, delay in pairs]
@@ -80,7 +80,7 @@ def late_margins(given: Given, delay_s: float, band: tuple[float, float] | None)
         f"zeros and poles certified, intervals leave no crossing out; {common.moved_text}",
         delay_s,
         (*hidden_notes(hidden), *common.notes),
-        hidden.on_border + loop.hidden_at_end,
+        hidden.at_limit + loop.hidden_at_end,
         common.reals,
     )
 
@@ -107,7 +107,7 @@ def _found(
     """What one of them does along the axis, and its unstable closed-loop poles by both ways."""
     found, free = _along(loop, period_s, delay_s, band, one), loop.closed_poles
     nyquist = loop.poles.right - found.half_turns
-    if period_s is not None or free.on_border:
+    if period_s is not None or free.at_limit:
         return found, nyquist, None
     if nyquist != free.right + passed_into(found.loop, found.gain_w):
         raise Doubtful("poles and Nyquist count disagree")

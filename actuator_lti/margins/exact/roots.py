@@ -78,7 +78,7 @@ def _isolated(coefficients: tuple[Any, ...], bits: int) -> list[tuple[acb, int]]
 class HalfPlanes:
     right: int  # roots with a positive real part, multiplicities counted
     at_zero: int  # multiplicity of the root zero
-    border: tuple[tuple[arb, int], ...]  # w > 0 of the roots +-j w, with their multiplicity
+    undamped: tuple[tuple[arb, int], ...]  # w > 0 of the roots +-j w, with their multiplicity
     find: Callable[[], tuple[acb, ...]]
 
     @cached_property
@@ -92,9 +92,9 @@ class HalfPlanes:
         return tuple(complex(root) for root in self.roots)
 
     @property
-    def on_border(self) -> int:
+    def at_limit(self) -> int:
         """Number of roots on the axis."""
-        return self.at_zero + 2 * sum(times for _, times in self.border)
+        return self.at_zero + 2 * sum(times for _, times in self.undamped)
 
 
 NOTHING_HIDDEN = HalfPlanes(0, 0, (), tuple)
@@ -111,7 +111,7 @@ def half_planes(p: fmpz_poly) -> HalfPlanes:
         p, at_zero = p.right_shift(1), at_zero + 1
     parts = split(p)
     symmetric = parts.even.gcd(parts.odd) if parts.odd.degree() >= 0 else parts.even
-    border: list[tuple[arb, int]] = []
+    undamped: list[tuple[arb, int]] = []
     right, placed = 0, [(acb(0), at_zero)]
     if symmetric.degree() > 0:
         mirrored = symmetric(_SQUARE)
@@ -119,18 +119,18 @@ def half_planes(p: fmpz_poly) -> HalfPlanes:
         for v, times in all_roots(symmetric):  # v = -s^2: s on the axis exactly where v is real and positive
             on_axis = v.imag.is_zero() and v.real > 0
             root = acb(0, v.real.sqrt()) if on_axis else (-v).sqrt()
-            border += [(root.imag, times)] if on_axis else []
+            undamped += [(root.imag, times)] if on_axis else []
             placed += [(root, times), (-root, times)]
-        border.sort(key=lambda pair: float(pair[0].mid()))
-        right = symmetric.degree() - sum(times for _, times in border)
+        undamped.sort(key=lambda pair: float(pair[0].mid()))
+        right = symmetric.degree() - sum(times for _, times in undamped)
     beyond = right_of_axis(p)
     if beyond is None:
-        beyond = sum(times for root, times in _told_from_axis(p) if root.real > 0)
+        beyond = sum(times for root, times in _clear_of_axis(p) if root.real > 0)
 
     def found() -> tuple[acb, ...]:
-        return tuple(root for root, times in (*placed, *_told_from_axis(p)) for _ in range(times))
+        return tuple(root for root, times in (*placed, *_clear_of_axis(p)) for _ in range(times))
 
-    return HalfPlanes(right + beyond, at_zero, tuple(border), found)
+    return HalfPlanes(right + beyond, at_zero, tuple(undamped), found)
 
 
 def right_of_axis(p: fmpz_poly) -> int | None:
@@ -174,14 +174,14 @@ def warped(p: Polynomial, degree: int) -> Polynomial:
     return kind(about[::-1])(kind([1, -1]))
 
 
-def _told_from_axis(p: fmpz_poly) -> list[tuple[acb, int]]:
+def _clear_of_axis(p: fmpz_poly) -> list[tuple[acb, int]]:
     """All roots of a polynomial that has none on the axis, each known to lie left or right of it."""
 
-    def told() -> list[tuple[acb, int]] | None:
+    def isolated() -> list[tuple[acb, int]] | None:
         roots = all_roots(p)
         return roots if all(root.real > 0 or root.real < 0 for root, _ in roots) else None
 
-    return at_enough_bits(told, ctx.prec, "a closed-loop pole")
+    return at_enough_bits(isolated, ctx.prec, "a closed-loop pole")
 
 
 def at_enough_bits(find: Callable[[], Answer | None], bits: int, what: str) -> Answer:

@@ -1,5 +1,5 @@
 // What takes too long for a moving slider: once nothing has moved for a moment, one piece at a time.
-import { border } from "./border.js";
+import { limits } from "./limits.js";
 import { BEHIND, PLACE, STABLE, chart, colourOf, data, desk, find, outer, root, tell } from "./desk.js";
 import { moves } from "./history.js";
 import { figures, judged, view, x } from "./module.js";
@@ -36,8 +36,8 @@ const runLate = () => { // taken when it runs: what waits may be listed anew bef
 };
 const mapPieces = (found) => {
   const loop = found.loops[outer];
-  if (found.cells || !border.map || !inView || !loop.figures || loop.figures[STABLE] !== 1) return [];
-  const { hertz, amplitude } = border.map, { row } = found, cells = [];
+  if (found.cells || !limits.map || !inView || !loop.figures || loop.figures[STABLE] !== 1) return [];
+  const { hertz, amplitude } = limits.map, { row } = found, cells = [];
   const tones = hertz.map((f) => toneOf(f, row[data.places.outer] * row[data.places.period]));
   const settling = loop.figures[PLACE.settling_time], wait = 1.5 * (Number.isFinite(settling) ? settling : 400 * loop.period);
   const ticks = startUp(row, wait);
@@ -54,10 +54,10 @@ const mapPieces = (found) => {
   return listed;
 };
 const drawMap = (cells) => {
-  if (!border.map) return;
+  if (!limits.map) return;
   const edges = (list, k) => { const half = Math.sqrt(list[1] / list[0]); return [list[k] / half, list[k] * half]; };
-  const { hertz, amplitude } = border.map;
-  tell("border", "cells", { panel: 0, cells: cells.filter(({ cause }) => cause !== "none").map(({ j, k, cause }) => ({
+  const { hertz, amplitude } = limits.map;
+  tell("linear-limit", "cells", { panel: 0, cells: cells.filter(({ cause }) => cause !== "none").map(({ j, k, cause }) => ({
     x: edges(hertz, k), y: edges(amplitude, j).map((value) => value / data.step.factor), colour: colourOf(cause), words: data.map.words[cause],
   })) });
   const seen = [...new Set(cells.map(({ cause }) => cause))];
@@ -79,5 +79,5 @@ export const watchMap = () => {
     if (seen === inView) return;
     inView = seen;
     if (inView) fillBehind();
-  }, { rootMargin: "200px" }).observe(chart("border"));
+  }, { rootMargin: "200px" }).observe(chart("linear-limit"));
 };

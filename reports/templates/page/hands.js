@@ -1,12 +1,12 @@
 // The sliders: keys of the design -> row of the simulator -> loops, margins, curves and a run, all in the module.
 import { emptyBehind, fillBehind, watchMap } from "./behind.js";
-import { border, borderStart, drawBorder } from "./border.js";
+import { limits, limitsStart, drawLimits } from "./limits.js";
 import { beside, designed, draw, frame, kept } from "./curves.js";
 import { LOOP_NAMES, chart, data, desk, find, root } from "./desk.js";
 import { holdCurves, marginMarks, stepGain } from "./drag.js";
 import { changedText, copy, save, savePatch, sheet } from "./file.js";
 import { fragment, free, fromFragment, keys, past, pin, redo, reset, restore, start, undo, unpin } from "./history.js";
-import { borderOf, compute, load, slow } from "./module.js";
+import { limitsOf, compute, load, slow } from "./module.js";
 import { follow, playStart } from "./playback.js";
 import { forget, overLoop, overRun, take } from "./record.js";
 import { refusalOf } from "./relations.js";
@@ -64,7 +64,7 @@ const update = () => {
   state();
   find('[data-do="pin"]').disabled = Boolean(desk.refused) || !free();
   drawLoop(desk.shown);
-  drawBorder("as changed", borderOf(desk.now.row, border.grid));
+  drawLimits("as changed", limitsOf(desk.now.row, limits.grid));
   root.dataset.ms = (performance.now() - began).toFixed(1);
   followUp = setTimeout(answered, 0);
 };
@@ -96,11 +96,11 @@ const begin = () => {
     event.preventDefault();
     stepGain(by);
   });
-  chart("border").addEventListener("chart:click", (/** @type {any} */ { detail }) => { forget("record"); playSine(detail.x, detail.y); });
+  chart("linear-limit").addEventListener("chart:click", (/** @type {any} */ { detail }) => { forget("record"); playSine(detail.x, detail.y); });
   runKeys();
   playStart();
   runStart();
-  borderStart();
+  limitsStart();
   choose(desk.shown);
   const acts = {
     undo, redo, reset, pin, unpin, restore,

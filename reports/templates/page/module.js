@@ -71,7 +71,7 @@ export const meanAt = (row, turns) => { // gain and phase of the mean over n sam
   return n > 1 ? [Math.sin(n * half) / (n * Math.sin(half)), -half * (n - 1)] : [1, 0];
 };
 // command amplitude at which each limit is just reached, over frequency
-export const borderOf = (row, hertz) => {
+export const limitsOf = (row, hertz) => {
   const ratio = row[data.places.ratio], T = row[data.places.outer], count = hertz.length;
   const period = T * row[data.places.period];
   view(x.p_at(), row.length).set(row);

@@ -1,8 +1,8 @@
-"""The public border: an argument of another kind than its annotation says is refused in one line.
+"""Arguments of public functions: one of another kind than its annotation says is refused in one line.
 
-The border is the package: a name taken from it looks at its arguments inside the house too; a function taken
-from the module that defines it looks at nothing, unless that module is public itself (`nonlinear.commands`).
-Methods look where they are marked.
+The package is what is public: a name taken from it looks at its arguments inside the house too; a
+function taken from the module that defines it looks at nothing, unless that module is public itself
+(`nonlinear.commands`). Methods look where they are marked.
 """
 
 import sys

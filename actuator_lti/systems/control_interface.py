@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 _POINTS = 2000
 
 
-class ControlFace(control.FrequencyResponseData, NonlinearIOSystem):
+class ControlInterface(control.FrequencyResponseData, NonlinearIOSystem):
     """Base of `DelaySystem`: the attributes and hooks that python-control looks for."""
 
     # of frequency response data: how to plot, and no interpolation
