@@ -222,8 +222,8 @@ def size_item(design: Design, values: Sequence[DesignValue], *, kept_constants: 
         if one.agrees:
             continue
         if kind == "back" and kept_constants:
-            told_how = "so kM and all torques are as far off: --electrical takes it from the record"
-            reasons.append(f"{off}, {told_how}")
+            with_it = "so kM and all torques are as far off: --electrical takes it from the record"
+            reasons.append(f"{off}, {with_it}")
         elif not 1.0 / most <= one.ratio <= most:
             known = {design.total_ratio: f"the reduction {design.total_ratio:g}"}
             reasons.append(with_factor(off, one.ratio, known))
