@@ -5,6 +5,7 @@ Keys beyond these are allowed: a later version may say more. What a chart holds 
 
 from __future__ import annotations
 
+from functools import cache
 from typing import Annotated, Any, Final, Literal, NotRequired
 
 from pydantic import (
@@ -259,7 +260,10 @@ class Document(TypedDict):
     live: NotRequired[SkipValidation[Tree]]  # its scripts read it, no part of the document
 
 
-_DOCUMENT: TypeAdapter[Document] = TypeAdapter(Document)
+@cache
+def _reader() -> TypeAdapter[Document]:
+    """Made with the first document: what a terminal shows needs none."""
+    return TypeAdapter(Document)
 
 
 def validate(made: Any, origin: str | None = None) -> None:
@@ -270,7 +274,7 @@ def validate(made: Any, origin: str | None = None) -> None:
         found = shown(made.get("version"))
         raise InputError(f"version = {found}: this program reads version {VERSION}", where=origin)
     try:
-        _DOCUMENT.validate_python(made)
+        _reader().validate_python(made)
     except RecursionError:
         raise InputError("details within details: nested too deeply", where=origin) from None
     except ValidationError as error:

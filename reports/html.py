@@ -23,7 +23,7 @@ from actuator_lti.types import Progress
 from reports.charts.svg import draw_all
 from reports.document import dumps, figures, loads
 from reports.glossary import meaning
-from reports.numbers import MISSING, show, significant
+from reports.numbers import show, show_signed
 from reports.scripts import asset, bundled
 from reports.verdict_summary import role, verdict_lines, why
 from reports.visible import LINE_END, visible
@@ -125,7 +125,3 @@ def security_policy(script: str, *, wasm: bool) -> str:
     scripts = f"'sha256-{digest}'" + " 'wasm-unsafe-eval'" * wasm
     own = "default-src 'none'; style-src 'unsafe-inline'; img-src data:"
     return f"{own}; script-src {scripts}; base-uri 'none'"
-
-
-def show_signed(value: float | None, digits: int = 3) -> str:
-    return MISSING if value is None else ("+" if value > 0 else "") + significant(value, digits)

@@ -63,6 +63,10 @@ def significant(value: float, digits: int = 3) -> str:
     return to_minus(mantissa) + "×" + power_of_ten(int(power))
 
 
+def show_signed(value: float | None, digits: int = 3) -> str:
+    return MISSING if value is None else ("+" if value > 0 else "") + significant(value, digits)
+
+
 def power_of_ten(exponent: int) -> str:
     return "10" + str(exponent).translate(_SUPERSCRIPT)
 

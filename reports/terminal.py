@@ -16,8 +16,7 @@ from reports import document as doc
 from reports.certain import certain
 from reports.cli.output import console, printable
 from reports.document_schema import GOES_ON
-from reports.html import show_signed
-from reports.numbers import prose, show
+from reports.numbers import prose, show, show_signed
 from reports.verdict_summary import judged, role, tally, walk, worded
 
 COLOURS = {"pass": "green", "fail": "bold red", "warn": "yellow", "info": "dim"}

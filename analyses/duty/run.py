@@ -1,6 +1,7 @@
 """Simulate a duty, then heat the winding and the overload state with its current."""
 
 from bisect import bisect_left
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cached_property
@@ -51,7 +52,7 @@ class Duty:
 
     design: Design
     asked: Asked
-    rms_A: float  # current of the whole cycle, in motion, at rest, largest; both steady
+    rms_A: float  # current of the whole cycle, in motion from its start on, at rest, largest
     moving_rms_A: float
     holding_A: float
     peak_A: float
@@ -144,34 +145,56 @@ def duty(design: AnyDesign, asked: Asked | None = None) -> Duty:
     asked = Asked.of(design) if asked is None else asked
     there = jammed(design) if design.controller.outermost == "current" else design
     free = replace(there, limits=replace(design.limits, peak_time_s=None))
-    piece, rest, steady = _cycle(free, asked)
-    current, speed = (piece.signal(name).copy() for name in ("current_A", "motor_speed_rad_s"))
-    ticks, still = current.size, np.zeros(1) if rest is None else rest.signal("current_A")
-    periods, more = divmod(_moving_ticks(asked, design.controller.period_s, ticks), ticks)
+    piece, motion, still, steady = _cycle(free, asked)
+    (R, _, kE), legs = winding(design.effective_motor), (*motion, *still)
 
-    def mean(values: Floats) -> float:
-        return float((periods * np.sum(values) + np.sum(values[:more])) / (periods * ticks + more))
+    def means(of: Callable[[_Leg], Floats]) -> tuple[float, float]:
+        """Over the motion and over the rest."""
+        totals = (sum(leg.times * float(of(leg).sum()) for leg in each) for each in (motion, still))
+        ticks = (sum(leg.times * leg.current_A.size for leg in each) for each in (motion, still))
+        moved, held = (total / max(count, 1) for total, count in zip(totals, ticks, strict=True))
+        return moved, held
 
-    moving, held = sqrt(mean(current**2)), float(np.sqrt(np.mean(still**2)))
-    R, _, kE = winding(design.effective_motor)
-    shaft = kE * current * speed
-    power = R * current**2 + shaft
-    peak = max(float(np.abs(part).max()) for part in (current, still))
-    rms = float(np.sqrt(asked.share * moving**2 + (1.0 - asked.share) * held**2))
+    heats, gives = means(lambda leg: leg.current_A**2), means(lambda leg: leg.shaft_A_rad_s)
+    whole = (asked.share, 1.0 - asked.share)
+    rms = sqrt(float(np.dot(whole, heats)))
+    power = np.concatenate([R * leg.current_A**2 + kE * leg.shaft_A_rad_s for leg in legs])
+    current = piece.signal("current_A").copy()
     return Duty(
-        design, asked, rms, moving, held, peak,
+        design, asked, rms, sqrt(heats[0]), sqrt(heats[1]),
+        max(float(np.abs(leg.current_A).max()) for leg in legs),
         design.limits.continuous_current_A, piece.limited,
-        asked.share * mean(shaft), float(power.max()), max(0.0, -float(power.min())),
-        design.controller.period_s * np.arange(ticks, dtype=float), current, steady,
-        _overload(design, asked, current, held), heating(design, rms),
+        kE * float(np.dot(whole, gives)), float(power.max()), max(0.0, -float(power.min())),
+        design.controller.period_s * np.arange(current.size, dtype=float), current, steady,
+        _overload(design, asked, motion, sqrt(heats[1])), heating(design, rms),
     )  # fmt: skip
 
 
-def _cycle(design: Design, asked: Asked) -> tuple[Piece, Piece | None, bool]:
-    """What is taken of the motion, the rest that follows it, and whether the motion is steady.
+@dataclass(frozen=True)
+class _Leg:
+    """A part of a cycle, which comes so many times: current, and current times speed."""
+
+    current_A: Floats
+    shaft_A_rad_s: Floats
+    times: int = 1
+
+    @classmethod
+    def of(cls, piece: Piece, times: int = 1, ticks: int | None = None) -> "_Leg":
+        """Of a piece, or its first ticks."""
+        current, speed = (piece.signal(name)[:ticks] for name in ("current_A", "motor_speed_rad_s"))
+        return cls(current.copy(), current * speed, times)
+
+
+Legs = tuple[_Leg, ...]
+
+
+def _cycle(design: Design, asked: Asked) -> tuple[Piece, Legs, Legs, bool]:
+    """Steady motion, motion and rest of a cycle, and whether the motion is steady.
 
     That is where the slowest pole has fallen to `STEADY` and, with all that is not linear, the rms current is
-    the same after twice as long. The rest goes on from there: friction holds what the motion has left.
+    the same after twice as long. The rest goes on from there, and the motion begins from the rest; one too
+    short to forget that is followed with its rest until the rms current of a cycle is the same again, or for
+    as long as the motion itself was.
     """
     Ts, size = design.controller.period_s, asked.size_of(design)
     every = round(design.controller.period_of(design.controller.outermost) / Ts)
@@ -188,7 +211,7 @@ def _cycle(design: Design, asked: Asked) -> tuple[Piece, Piece | None, bool]:
     drive = simulate(design, command, taken * Ts, asked.load_Nm).running
     assert drive is not None
     gone, before, settling = 0, inf, settling_ticks_of(design, STEADY)
-    wait = max(PERIODS * taken // periods, ceil(settling) if settling < inf else 0)
+    first = wait = max(PERIODS * taken // periods, ceil(settling) if settling < inf else 0)
     while True:
         while gone < wait and drive.work < MOST_WORK:
             piece, gone = _went_well(drive.advance(taken)), gone + taken
@@ -198,10 +221,32 @@ def _cycle(design: Design, asked: Asked) -> tuple[Piece, Piece | None, bool]:
             break
         wait, before = 2 * gone, rms
     if asked.share == 1.0:
-        return piece, None, steady
-    drive.command(0.0)
-    resting = min((1.0 - asked.share) * asked.cycle_s / Ts, float(MOST_TICKS))
-    return piece, _went_well(drive.advance(max(1, round(resting)))), steady
+        return piece, (_Leg.of(piece),), (), steady
+    moving, moves = max(taken, round(asked.share * asked.cycle_s / Ts)), drive.p.copy()
+    begins = min(moving, taken * max(1, min(ceil(first / taken), MOST_TICKS // taken)))
+    times, more = divmod(moving - begins, taken)
+    motion = (_Leg.of(piece, times),) * (times > 0) + (_Leg.of(piece, ticks=more),) * (more > 0)
+
+    def rest() -> Legs:
+        drive.command(0.0)
+        ticks = min((1.0 - asked.share) * asked.cycle_s / Ts, float(MOST_TICKS))
+        there = (_Leg.of(_went_well(drive.advance(max(1, round(ticks))))),)
+        drive.p[:] = moves
+        return there
+
+    if more:
+        drive.advance(more)
+    still, before, until = rest(), inf, drive.work + gone
+    while True:
+        parts = (drive.advance(min(taken, begins - k)) for k in range(0, begins, taken))
+        begun = tuple(_Leg.of(_went_well(part)) for part in parts)
+        if motion:  # long enough to forget how it began
+            return piece, begun + motion, still, steady
+        still = rest()
+        rms = sqrt(sum(float(leg.current_A @ leg.current_A) for leg in begun + still))
+        if abs(rms - before) <= STEADY * rms or drive.work >= until:
+            return piece, begun, still, steady
+        before = rms
 
 
 def _went_well(piece: Piece) -> Piece:
@@ -234,35 +279,30 @@ def _periods(design: Design, asked: Asked, updates: float) -> tuple[int, int]:
     return periods, round(periods * updates)
 
 
-def _overload(design: Design, asked: Asked, current: Floats, held: float) -> Overload | None:
+def _overload(design: Design, asked: Asked, motion: Legs, held: float) -> Overload | None:
     """The first-order state of (i/i_cont)^2 over motion and rest, repeated for ever."""
     from scipy.signal import lfilter  # takes a second to load, and the first screen asks of this room
 
     tau, Ts = design.limits.overload_time_s, design.controller.period_s
     if tau is None:
         return None
-    drive = (current / design.limits.continuous_current_A) ** 2
-    still = (held / design.limits.continuous_current_A) ** 2
-    a = 1.0 - Ts / tau
-    gained = lfilter([Ts / tau], [1.0, -a], drive)  # over a period, from 0
-    decay = a ** (np.arange(drive.size) + 1.0)
-    moving = _moving_ticks(asked, Ts, drive.size)
-    periods, part = divmod(moving, drive.size)
-    rest_s = moving * Ts * (1.0 / asked.share - 1.0)
-    cooled = exp(-rest_s / tau)
-
-    def after(x: float, periods: int) -> float:
-        left = decay[-1] ** periods
-        return float(left * x + gained[-1] * (1.0 - left) / (1.0 - decay[-1]))
+    rated, a = design.limits.continuous_current_A, 1.0 - Ts / tau
+    moving_s = Ts * sum(leg.times * leg.current_A.size for leg in motion)
+    rest_s = moving_s * (1.0 / asked.share - 1.0)
+    still, cooled = (held / rated) ** 2, exp(-rest_s / tau)
+    gained = [lfilter([Ts / tau], [1.0, -a], (leg.current_A / rated) ** 2) for leg in motion]  # from 0
+    decay = [a ** (np.arange(each.size) + 1.0) for each in gained]
 
     def cycle(x: float) -> tuple[float, float]:
-        """Largest in the cycle that begins with x, in its first or last period or its rest; its end."""
-        last = after(x, periods)
-        levels = [decay * start + gained for start in (x, after(x, periods - 1), last)]
-        levels[2] = levels[2][:part]
-        end = float(levels[2][-1]) if part else last
-        end = still + (end - still) * cooled
-        return max(end, *(float(one.max(initial=0.0)) for one in levels)), end
+        """Largest in the cycle that begins with x, in the first or last time of each leg; its end."""
+        most = x
+        for leg, more, left in zip(motion, gained, decay, strict=True):
+            kept = left[-1] ** (leg.times - 1)
+            last = kept * x + more[-1] * (1.0 - kept) / (1.0 - left[-1])
+            most = max(most, *(float((left * begin + more).max()) for begin in (x, last)))
+            x = float(left[-1] * last + more[-1])
+        end = still + (x - still) * cooled
+        return max(most, end), end
 
     start = cycle(0.0)[1]
     slope = cycle(1.0)[1] - start  # of the state after a cycle over that before
@@ -272,20 +312,15 @@ def _overload(design: Design, asked: Asked, current: Floats, held: float) -> Ove
         return Overload(peak, None)
     cycles = bisect_left(range(MOST_CYCLES), 1.0, key=lambda k: cycle(settled * (1.0 - slope**k))[0])
     if asked.share < 1.0:
-        return Overload(peak, (cycles + 1) * (moving * Ts + rest_s))
-    one = _period(asked, Ts, drive.size)
-    over = int(np.argmax(decay * settled * (1.0 - slope**cycles) + gained >= 1.0))
-    return Overload(peak, (cycles * drive.size + (over // one + 1) * one) * Ts)
+        return Overload(peak, (cycles + 1) * (moving_s + rest_s))
+    one = _period(asked, Ts, gained[0].size)
+    over = int(np.argmax(decay[0] * settled * (1.0 - slope**cycles) + gained[0] >= 1.0))
+    return Overload(peak, (cycles * gained[0].size + (over // one + 1) * one) * Ts)
 
 
 def _period(asked: Asked, Ts: float, taken: int) -> int:
     """Ticks of a period, of those of all that are taken."""
     return taken // max(1, round(taken * Ts * asked.frequency_hz))
-
-
-def _moving_ticks(asked: Asked, Ts: float, period: int) -> int:
-    """Ticks of the motion in a cycle, at least a period; of one that does not rest, a period."""
-    return max(period, round(asked.share * asked.cycle_s / Ts)) if asked.share < 1.0 else period
 
 
 def heating(design: Design, rms_A: float) -> Heating | None:

@@ -4,10 +4,10 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.optimize import root_scalar
 
 from actuator_lti.design.model import Design
 from actuator_lti.drive.steady import drive_gain, filtered, motor_torque_Nm
+from actuator_lti.systems.root import root
 from actuator_lti.types import Floats
 from analyses.friction_effects.breakaway import StaticThreshold
 from analyses.friction_effects.orbit import Orbit
@@ -124,4 +124,5 @@ def _lag_rad(design: Design, load_Nm: float, static: StaticThreshold, way: float
         return lag - way * about.at_zero_rad - stays - twist
 
     standing = 0.5 * (sliding(0.0, way)[1] + sliding(0.0, -way)[1])
-    return float(root_scalar(missing, x0=0.0, x1=-missing(0.0) or 1e-12).root)
+    most = 4.0 * abs(missing(0.0))  # what the load makes of the lag is little of it
+    return root(missing, -most, most)

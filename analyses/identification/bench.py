@@ -221,5 +221,6 @@ def _items(
     yield from verdict.offset_items(design, model)
     yield from verdict.kept_items(model, sought.held, design.axis)
     yield from verdict.lag_items(right.late_s, late)
+    yield from verdict.phase_items(design, model, records)
     for record in records:
         yield from verdict.sampling_items(record)

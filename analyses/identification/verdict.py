@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -19,7 +19,15 @@ from analyses.identification.design_values import DesignValue, cause
 from analyses.identification.friction_law import Bend
 from analyses.identification.joint_model import JointModel
 from analyses.identification.residuals import ResidualTest
-from analyses.records.consistency import NO_CHANCE, PROPORTIONAL, RATE_TOLERANCE, Finding, wrong_of
+from analyses.records.consistency import (
+    NO_CHANCE,
+    PROPORTIONAL,
+    RATE_TOLERANCE,
+    SURE,
+    Finding,
+    one_phase,
+    wrong_of,
+)
 from analyses.records.factors import with_factor
 from analyses.records.record import Record
 
@@ -176,6 +184,20 @@ def lag_items(late_s: float, late: bool) -> Iterator[Item]:
         said = f"{1e3 * late_s:.2g} ms off, or not told closer: what is sure is taken back as a delay"
         why = f"{said}; the intervals hold what a filter of first order would make of it"
         yield Item.unproven("lag", "Current and motion at one time", why)
+
+
+def phase_items(design: Design, model: JointModel, records: Sequence[Record]) -> Iterator[Item]:
+    """Values less a bias that hangs on when rows are taken: all at one phase of a loop that runs more rarely.
+
+    What a loop makes of a jump between the rows is then a share of the acceleration, as inertia is.
+    """
+    moved = {name: one / model[name] for name, one in model.bias.items() if abs(one) > SURE * model.std(name)}
+    shares = [f"{100.0 * one:.2g} % of {parameter(name, design.axis).label}" for name, one in moved.items()]
+    rows = [record.name for record in records if one_phase(design, replace(record, between=""))]
+    if shares and rows:
+        why = f"all rows of {', '.join(rows)} are at one phase of the outer loop, taken to be its tick: "
+        why += f"{', '.join(shares)} is taken off for that; log faster, or at another period"
+        yield Item.unproven("phase", "Rows at the outer loop's ticks", why)
 
 
 def sampling_items(record: Record) -> Iterator[Item]:

@@ -108,7 +108,8 @@ def _reserves(same: Sequence[View], design: Design, path: str, values: np.ndarra
     at = {"operating_point": same[0].kind, "load_Nm": same[0].load_Nm}
     try:
         population = Population(same[0].design or design, {path: values}, len(values))
-        found = linear_figures(population, **at, time_figures=False, held=True)
+        loops = {view.loop for view in same}
+        found = linear_figures(population, **at, time_figures=False, held=True, loops=loops)
     except InputError:
         return np.full((len(same), len(values)), -inf)
     return np.array([_least(found, view, design) for view in same])

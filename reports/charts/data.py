@@ -5,6 +5,7 @@ A value that is the default is left out, numbers have the digits that a figure s
 
 from collections.abc import Mapping, Sequence
 from dataclasses import MISSING, fields, is_dataclass
+from functools import cache
 from typing import Any, cast
 
 import numpy as np
@@ -16,7 +17,11 @@ from reports.charts.axis import Axis
 from reports.charts.chart import Chart, Column
 
 DIGITS = 6
-_READER = TypeAdapter(Chart)
+
+
+@cache
+def _reader() -> TypeAdapter[Chart]:
+    return TypeAdapter(Chart)
 
 
 def chart_data(chart: Chart) -> Tree:
@@ -34,7 +39,7 @@ def chart_data(chart: Chart) -> Tree:
 def chart_of(data: Mapping[str, Any]) -> Chart:
     """Make the chart of such data; of what is none an InputError names the first place that is wrong."""
     try:
-        chart = _READER.validate_python(data)
+        chart = _reader().validate_python(data)
     except ValidationError as error:
         first = error.errors(include_url=False)[0]
         place = ".".join(map(str, first["loc"]))

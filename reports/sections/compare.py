@@ -16,8 +16,7 @@ from analyses.specification.requirements import RequirementVerdict
 from analyses.validation.row import Row as Check
 from reports import document as doc
 from reports.as_json import as_json
-from reports.html import show_signed
-from reports.numbers import capital, row_unit, significant
+from reports.numbers import capital, row_unit, show_signed, significant
 from reports.sections import compare_best, compare_figures
 from reports.sections.compare_best import SEEN, number, unstable_words
 from reports.sections.names import LOOPS

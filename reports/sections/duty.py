@@ -19,9 +19,9 @@ _SHOWN = 400
 def section(result: Duty) -> doc.Section:
     intro = (
         "The motion is simulated until its rms current is steady, friction, play and limits at work, the "
-        "overload protection left out; a rest goes on from there. Their current, repeated without end, heats "
-        "the winding by its mean copper loss and drives the overload state. Power is of copper and shaft: a "
-        "supply or brake resistor takes what comes back."
+        "overload protection left out; a rest goes on from there, and a motion begins from the rest. Their "
+        "current, repeated without end, heats the winding by its mean copper loss and drives the overload "
+        "state. Power is of copper and shaft: a supply or brake resistor takes what comes back."
     )
     note = f"Duty: {asked_words(result)}."
     if runs(result.design) and follows_angle(result.design) and result.asked.share < 1.0:

@@ -14,7 +14,7 @@ from analyses.identification.bench import BenchResult, identify_bench
 from analyses.identification.own_bias import in_counts
 from analyses.records.consistency import check_record
 from analyses.records.record import Record
-from tests.identification.bench_records import errors_off, record_of
+from tests.identification.bench_records import errors_off, item_of, record_of
 from tests.refusals import refused
 
 OHM, HENRY, BACK, RATIO = 0.6, 3e-4, 0.05, 50.0
@@ -168,7 +168,9 @@ def test_rows_at_the_ticks_of_the_position_loop_tell_the_inertia(gain, every, to
     command = np.repeat(np.random.default_rng(1).uniform(-0.2, 0.2, 20), 2000)
     record = _every(_recorded(command, "steps", 10, gain), every)
     design = with_values(_design(), {"control.position.every": 10, "control.position.gain": gain})
-    model = identify_bench(design, [record if told else record.without({"reference"})]).model
+    result = identify_bench(design, [record if told else record.without({"reference"})])
+    model = result.model
+    assert "% of Inertia, all at the motor" in item_of(result, "phase").reason  # as of another tick
     assert errors_off(model, {"inertia": INERTIA}) < 3.5
     assert model["inertia"] == pytest.approx(INERTIA, rel=near)
     assert model.std("inertia") < near * INERTIA

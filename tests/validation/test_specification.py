@@ -282,18 +282,35 @@ def test_a_rest_goes_on_from_the_motion_and_a_period_of_no_whole_ticks_is_played
 def test_the_overload_state_of_motion_and_rest_is_its_recursion(
     share: float, cycle_s: float, hz: float
 ) -> None:
-    """Tick by tick from the cold drive: 40 % of the cycle in motion, whole periods or not, 60 % at rest."""
+    """Tick by tick from the cold drive, of a late cycle: 40 % in motion, whole periods or not, 60 % at rest.
+
+    The motion begins from rest: it had been taken as steady from its first tick, and the rest without power.
+    """
     design = with_overrides(JOINT, {"limits.peak_time": "5 s", "limits.continuous_current": "4 A"})
     asked = Asked.of(design, amplitude_rad=0.3, frequency_hz=hz, load_Nm=70.0, share=share, cycle_s=cycle_s)
     result, Ts = duty(design, asked), design.controller.period_s
+    many = max(3, ceil(30.0 / cycle_s))  # cycles, of which the last is looked at
+    t = np.arange(0.0, many * cycle_s, 5e-4)
+    moves = 0.3 * np.sin(2.0 * np.pi * hz * (t % cycle_s)) * (t % cycle_s < share * cycle_s - 1e-9)
+    free = replace(design, limits=replace(design.limits, peak_time_s=None))
+    run = simulate(free, commands.sampled(t, moves), many * cycle_s, 70.0)
+    i, w = (signal[-round(cycle_s / Ts) :] for signal in (run.current_A, run.motor_speed_rad_s))
     ticks = round(share * cycle_s / Ts)
-    moving = (np.resize(result.current_A, ticks) / 4.0) ** 2
-    still = np.full(round((1.0 / share - 1.0) * ticks), ((result.holding_A or 0.0) / 4.0) ** 2)
+    R, kE = design.motor.resistance_ohm, design.motor.back_emf_constant_Vs_rad
+    for value, wanted in (
+        (result.moving_rms_A, np.sqrt(np.mean(i[:ticks] ** 2))),
+        (result.rms_A, np.sqrt(np.mean(i**2))),
+        (result.peak_A, np.abs(i).max()),
+        (result.shaft_W, np.mean(kE * i * w)),
+        (result.peak_power_W, (R * i**2 + kE * i * w).max()),
+        (result.fed_back_W, -(R * i**2 + kE * i * w).min()),
+    ):
+        assert value == pytest.approx(wanted, rel=2e-3)
+    still = np.full(i.size - ticks, (result.holding_A / 4.0) ** 2)
     a, tau = Ts / design.limits.overload_time_s, design.limits.overload_time_s
     cycles = ceil(15.0 * tau / cycle_s)  # 3e-7 of the start is left
-    states = lfilter([a], [1.0, a - 1.0], np.tile(np.concatenate([moving, still]), cycles))
-    assert result.moving_rms_A == pytest.approx(4.0 * np.sqrt(moving.mean()), rel=1e-12)
-    assert result.overload.peak == pytest.approx(states[-round(cycle_s / Ts) :].max(), rel=1e-5)
+    states = lfilter([a], [1.0, a - 1.0], np.tile(np.concatenate([(i[:ticks] / 4.0) ** 2, still]), cycles))
+    assert result.overload.peak == pytest.approx(states[-i.size :].max(), rel=1e-3)
     over = np.flatnonzero(states >= 1.0)
     ends = ceil((over[0] + 1) * Ts / cycle_s) * cycle_s if over.size else None
     assert result.overload.acts_after_s == (ends and pytest.approx(ends))

@@ -80,7 +80,7 @@ def test_who_states_a_swing_that_is_accepted_has_rest_judged_by_it(
     found = LimitCycles(design, (), (small, step), ())
     monkeypatch.setattr(asked_figures, "_answered", lambda *_: found)
     rows = (judged("bandwidth", "position", 1.0, 1.0, 0.1, unit="Hz"),)
-    validation = Validation(design=design, rows=rows, figures={}, settlings=found.rests)
+    validation = Validation(design=design, rows=rows, figures={}, settlings=found.settlings)
     assert (found.verdict, validation.verdict) == (verdict, verdict)
     requirements = evaluate_requirements(design)
     assert not asked or all(one.passes for one in requirements) == (verdict == "met")
