@@ -56,7 +56,7 @@ def on_a_line(data: Any) -> Any:
     """Plain data of a linear axis: its names say m, N and kg; frequencies in rad/s, phases in rad stay.
 
     >>> on_a_line({"amplitude_rad": 0.1, "simulated_Nm_rad": [{"speed_rad_s": 1.0, "frequency_rad_s": 2.0}]})
-    {'amplitude_m': 0.1, 'seen_N_m': [{'speed_m_s': 1.0, 'frequency_rad_s': 2.0}]}
+    {'amplitude_m': 0.1, 'simulated_N_m': [{'speed_m_s': 1.0, 'frequency_rad_s': 2.0}]}
     """
     if isinstance(data, list):
         return [on_a_line(item) for item in data]
