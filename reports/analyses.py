@@ -155,8 +155,8 @@ ANALYSES = (
         Predict limit cycles of play and of a quantised output sensor, and seek them in the simulator.
 
         Each is predicted by describing function in the exact sampled loop, then the simulator is
-        started in its shape at sizes from 0.4 to 2.5 of it. Last, steps of the drive as it is are simulated
-        until they settle. The exit status is 1 where such a step ends in a cycle.
+        started in its shape at sizes from 0.4 to 2.5 of it. Last, step responses are simulated until they
+        settle. The exit status is 1 where such a step ends in a cycle.
 
         Try: actuator-lti cycles fin --set coupling.play="0.2 deg"
         """,

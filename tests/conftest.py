@@ -26,7 +26,6 @@ from tests.command_line import Command
 if TYPE_CHECKING:
     from playwright.sync_api import Browser
 
-os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as every command has it; two wait for each other
 if os.environ.get("OTHER_PROCESSOR"):
     from tests.machines import beside
 

@@ -90,8 +90,8 @@ def readings(driven: Driven, record: Record) -> list[Driven]:
         on_grid = replace(held, design=replace(driven.design, controller=control), hold=hold)
         if early is None:
             return [on_grid, held] if anywhere else [on_grid]
-        told = early[held.steps]
-        return [replace(held if anywhere and not hold.holds(told) else on_grid, early_s=told)]
+        early_s = early[held.steps]
+        return [replace(held if anywhere and not hold.holds(early_s) else on_grid, early_s=early_s)]
     found = [driven, replace(driven, together=MOST_TOGETHER)]
     if record.period_s > 1.5 * tick_s:
         found += [held, replace(driven, together=0, between=STRAIGHT)]

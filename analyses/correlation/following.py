@@ -10,8 +10,8 @@ from actuator_lti.design.control import FEED_FORWARD
 from actuator_lti.design.model import Design
 from actuator_lti.types import Floats
 from analyses.correlation.driving import Driven, command_of
-from analyses.estimation.least_squares import solve, told_apart
-from analyses.records.consistency import ALIKE, OVER, RATE_TOLERANCE, SURE, Finding
+from analyses.estimation.least_squares import identifiable, solve
+from analyses.records.consistency import OVER, PROPORTIONAL, RATE_TOLERANCE, SURE, Finding
 from analyses.records.driven_motion import ratio_of
 from analyses.records.record import Record
 
@@ -23,7 +23,7 @@ class Followed:
     """Shares by which a record's clock and the scale of its position are off, 0 where chance explains it."""
 
     stage: str  # that is commanded; behind a speed clock and scale are one
-    alike: float  # correlation of the recorded motion with the simulated one
+    cosine: float  # correlation of the recorded motion with the simulated one
     clock: float  # of the following error, recorded over simulated
     off: float = 0.0  # of what the position has too much of the motion
     limit: str = ""  # the largest current, where the loops take far more of it for the same command
@@ -34,17 +34,17 @@ class Followed:
     @property
     def fails(self) -> bool:
         """Whether they are off by more than an interval can hold."""
-        return self.alike < ALIKE or max(abs(self.clock), abs(self.off)) > RATE_TOLERANCE
+        return self.cosine < PROPORTIONAL or max(abs(self.clock), abs(self.off)) > RATE_TOLERANCE
 
     @property
     def words(self) -> str:
         """What is off, by how much, and by what."""
         if self.zero:
             unit = "m" if self.place == "position" else "rad"
-            told = f"the zero of the {self.place} is {self.zero:.4g} {unit} from that of its command"
-            return f"{told}: offset of its column in a record file"
-        if self.alike < ALIKE:
-            return f"the motion is not that of the command (correlation {self.alike:.2f})"
+            why = f"the zero of the {self.place} is {self.zero:.4g} {unit} from that of its command"
+            return f"{why}: offset of its column in a record file"
+        if self.cosine < PROPORTIONAL:
+            return f"the motion is not that of the command (correlation {self.cosine:.2f})"
         scale = "counts a revolution, the reduction, or a unit"
         what, ratio, of = "motion", 1.0 + self.clock, "which the loops make of the commanded speed"
         cause = f"the clock, {scale}"
@@ -84,20 +84,20 @@ def followed(
     if (by_clock := moved_by_clock(driven, record, place, model)) is not None:
         columns = [by_clock, model]
     table = np.column_stack([values - values.mean() for values in columns])
-    kept, _ = told_apart(table, ("clock", "motion")[-len(columns) :])
+    kept, _ = identifiable(table, ("clock", "motion")[-len(columns) :])
     if 0 not in kept or not np.ptp(own):
         return None
     size = np.linalg.norm(table[:, kept], axis=0)
     solved = solve(table[:, kept] / size, own - own.mean() - table[:, -1])
     shares, errors = solved.values / size, np.sqrt(np.diag(solved.correlated)) / size
-    _, alike = ratio_of(own - own.mean(), model - model.mean())
+    _, cosine = ratio_of(own - own.mean(), model - model.mean())
     clock, *off = np.where(np.abs(shares) > SURE * errors, shares, 0.0).tolist()
     limit, lags = _limit(record.signals, simulated), True
     position, error = control.position, _following_error(driven, place, model)
     if error is not None and position is not None and any(getattr(position, name) for name in FEED_FORWARD):
         fed = position.feedforward * np.gradient(error + model)
-        lags = ratio_of(error - error.mean(), np.gradient(model) - fed)[1] >= ALIKE
-    return Followed(driven.stage, alike, clock, sum(off), limit, place, lags)
+        lags = ratio_of(error - error.mean(), np.gradient(model) - fed)[1] >= PROPORTIONAL
+    return Followed(driven.stage, cosine, clock, sum(off), limit, place, lags)
 
 
 def _limit(recorded: Mapping[str, Floats], simulated: Mapping[str, Floats]) -> str:
@@ -105,8 +105,8 @@ def _limit(recorded: Mapping[str, Floats], simulated: Mapping[str, Floats]) -> s
     most = [float(np.max(np.abs(one["current"]))) for one in (recorded, simulated) if "current" in one]
     if len(most) < 2 or most[1] <= OVER * most[0]:
         return ""
-    told = f"the current stays below {most[0]:.3g} A, the design's loops take up to {most[1]:.3g} A"
-    return f"another gain, or a lower limit of the current (limits.peak_current): {told}"
+    why = f"the current stays below {most[0]:.3g} A, the design's loops take up to {most[1]:.3g} A"
+    return f"another gain, or a lower limit of the current (limits.peak_current): {why}"
 
 
 def moved_by_clock(driven: Driven, record: Record, place: str, model: Floats) -> Floats | None:
@@ -139,7 +139,7 @@ def following_finding(design: Design, one: Followed) -> Finding:
     loop, subject = design.controller.velocity, "following error against that of the design's loops"
     if one.zero:
         return Finding(subject, False, one.words)
-    if one.alike < ALIKE:
+    if one.cosine < PROPORTIONAL:
         return Finding(subject, None, one.words)
     if not one.fails:
         largest = 100.0 * max(abs(one.clock), abs(one.off))

@@ -63,10 +63,10 @@ def worst_of(results: Sequence[CorrelationResult]) -> tuple[CorrelationResult, S
     return max(every, key=lambda pair: pair[1].share_of_motion)
 
 
-def moves_alike(result: CorrelationResult) -> bool:
+def follows_model(result: CorrelationResult) -> bool:
     """Whether the model's motion, speed and drive each fit better than the measured mean: above 0 %."""
-    told = [worst_of([result])[1], *(result[name] for name in BESIDE if name in result.signals)]
-    return all(signal.share_beyond_noise <= 1.0 for signal in told)
+    compared = [worst_of([result])[1], *(result[name] for name in BESIDE if name in result.signals)]
+    return all(signal.share_beyond_noise <= 1.0 for signal in compared)
 
 
 @dataclass(frozen=True)
@@ -99,7 +99,7 @@ class Correlation:
             return False
         signals = [signal for one in self.records for signal in one.signals.values()]
         within = all(signal.share_beyond_noise <= self.limit for signal in signals)
-        return within and all(moves_alike(one) for one in self.records)
+        return within and all(follows_model(one) for one in self.records)
 
 
 def correlate(design: Design, asked: Asked, *, progress: Progress = None) -> Correlation:

@@ -5,6 +5,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cached_property
+from itertools import accumulate
 from math import ceil, exp, inf, isfinite, log, pi, sqrt
 
 import numpy as np
@@ -281,8 +282,6 @@ def _periods(design: Design, asked: Asked, updates: float) -> tuple[int, int]:
 
 def _overload(design: Design, asked: Asked, motion: Legs, held: float) -> Overload | None:
     """The first-order state of (i/i_cont)^2 over motion and rest, repeated for ever."""
-    from scipy.signal import lfilter  # takes a second to load, and the first screen asks of this room
-
     tau, Ts = design.limits.overload_time_s, design.controller.period_s
     if tau is None:
         return None
@@ -290,7 +289,8 @@ def _overload(design: Design, asked: Asked, motion: Legs, held: float) -> Overlo
     moving_s = Ts * sum(leg.times * leg.current_A.size for leg in motion)
     rest_s = moving_s * (1.0 / asked.share - 1.0)
     still, cooled = (held / rated) ** 2, exp(-rest_s / tau)
-    gained = [lfilter([Ts / tau], [1.0, -a], (leg.current_A / rated) ** 2) for leg in motion]  # from 0
+    driven = (Ts / tau * (leg.current_A / rated) ** 2 for leg in motion)
+    gained = [np.array([*accumulate(each.tolist(), lambda x, more: a * x + more)]) for each in driven]
     decay = [a ** (np.arange(each.size) + 1.0) for each in gained]
 
     def cycle(x: float) -> tuple[float, float]:

@@ -17,7 +17,7 @@ RESOLVED = 1e-5  # share of a slope that is its own: below it two values do the 
 
 
 @dataclass(frozen=True, kw_only=True)
-class NotTold:
+class NotIdentified:
     """A parameter that the rows do not tell, and which others it cannot be told from."""
 
     name: str
@@ -39,13 +39,13 @@ class Solution:
     condition: float
 
 
-def told_apart(
+def identifiable(
     w: Floats, names: Sequence[str], *, least: float = LEAST_OWN_SHARE
-) -> tuple[tuple[int, ...], tuple[NotTold, ...]]:
+) -> tuple[tuple[int, ...], tuple[NotIdentified, ...]]:
     """Which columns can be told apart (a share above ``least`` their own), the first named first.
 
     >>> w = np.column_stack([np.arange(4.0), np.ones(4), np.ones(4), np.zeros(4)])
-    >>> kept, left = told_apart(w, ("viscous", "dry", "offset", "load"))
+    >>> kept, left = identifiable(w, ("viscous", "dry", "offset", "load"))
     >>> kept, [f"{one.name} {one}" for one in left]
     ((0, 1), ['offset cannot be separated from dry', 'load is not excited at all'])
     """
@@ -67,13 +67,13 @@ def told_apart(
             share = np.linalg.lstsq(w[:, kept] / sizes, unit, rcond=None)[0]
             chosen = np.flatnonzero(np.abs(share) > 0.2 * np.abs(share).max())
             moves = {names[kept[j]]: float(share[j] * size / sizes[j]) for j in chosen}
-        left.append(NotTold(name=name, moves=moves))
+        left.append(NotIdentified(name=name, moves=moves))
     return tuple(kept), tuple(left)
 
 
 def independent(w: Floats, *, least: float = LEAST_OWN_SHARE) -> list[int]:
-    """Which columns can be told apart, as `told_apart` without names."""
-    return list(told_apart(w, [""] * w.shape[1], least=least)[0])
+    """Which columns can be told apart, as `identifiable` without names."""
+    return list(identifiable(w, [""] * w.shape[1], least=least)[0])
 
 
 def solve(w: Floats, y: Floats, ends: Sequence[int] = ()) -> Solution:

@@ -106,8 +106,8 @@ def identify_bench(
     else:
         model, both = with_found_constant(start, right.model, right.records, electrical)
     whole = [without_flat_tops(start, record, recipe) for record in unseen]
-    told = {**right.findings, **{record.name: tuple(clipped) for record, clipped in whole}}
-    findings = {name: (*each, *told[name]) for name, each in findings.items()}
+    more = {**right.findings, **{record.name: tuple(clipped) for record, clipped in whole}}
+    findings = {name: (*each, *more[name]) for name, each in findings.items()}
     right, unseen = replace(right, model=model), tuple(record for record, _ in whole)
     tests = residual_tests(model)
     items = list(_items(sought, findings, right, compared, tests))
@@ -179,8 +179,8 @@ def _made(
         return start, None, error.message
     for record in records:
         for key in record.settings.keys() & set(values.names):
-            told = f"is found from all records; allowed: any other key, or --fix {key}=VALUE"
-            raise InputError(f"settings.{key}: {told}", where=record.name)
+            why = f"is found from all records; allowed: any other key, or --fix {key}=VALUE"
+            raise InputError(f"settings.{key}: {why}", where=record.name)
     refined = None
     if settings.refine:
         refined = refine_records(made, records, values.names, progress=progress)

@@ -86,8 +86,8 @@ def identify_campaign(
     design = as_design(design)
     constant = design.effective_motor.torque_constant_Nm_A
     if constant is None:
-        told = "motor.torque_constant: the design has none, so currents cannot become torques"
-        raise InputError(told, design.name)
+        why = "motor.torque_constant: the design has none, so currents cannot become torques"
+        raise InputError(why, design.name)
     campaign = imported.campaign
     points, aside, findings = [], list(imported.set_aside), {}
     for run in imported.runs:
@@ -105,8 +105,8 @@ def identify_campaign(
     try:
         fit = fit_surface(points, tools, constant, outliers=campaign.outliers, fixed=fixed, kept=own)
     except InputError as error:
-        told = "; ".join(f"{run.id}: {run.reason}" for run in aside[:3])
-        raise InputError(error.message + f" ({told})" * bool(told), campaign.origin) from None
+        why = "; ".join(f"{run.id}: {run.reason}" for run in aside[:3])
+        raise InputError(error.message + f" ({why})" * bool(why), campaign.origin) from None
     gone = {run.id for run in aside}
     if lost := sum(run.id in gone and bool(run.load_Nm) for run in campaign.runs):
         none = "no run is loaded"
@@ -131,10 +131,10 @@ def _constant_shares(fit: SurfaceFit) -> Floats:
     """Relative change of each coefficient over that of the torque constant, beside those that are held."""
     rows = np.array([[1.0, p.speed_rad_s, p.load_Nm] for p in fit.points]) / fit.residual_stds_Nm[:, None]
     torque = np.array([p.torque_Nm for p in fit.points]) / fit.residual_stds_Nm
-    told, held = list(fit.told), [k for k in range(len(NAMES)) if k not in fit.told]
+    free, held = list(fit.determined), [k for k in range(len(NAMES)) if k not in fit.determined]
     own = torque - rows[:, held] @ fit.values[held]
     shares = np.zeros(len(NAMES))
-    shares[told] = scaled_lstsq(rows[:, told], torque) / scaled_lstsq(rows[:, told], own)
+    shares[free] = scaled_lstsq(rows[:, free], torque) / scaled_lstsq(rows[:, free], own)
     return shares
 
 
@@ -161,8 +161,8 @@ def check_run(
     least = (design.effective_motor.torque_constant_Nm_A or 0.0) * tools.current_offset_A
     least += SURE * float(np.sqrt(point.covariance[0, 0]))
     if point.torque_Nm < -least and (design.load.path == "self-locking" or not point.load_Nm):
-        told = f"{point.torque_Nm:.4g} N m with the motion, where friction alone acts against it"
-        text = f"the sign of the current is turned, or that of the speed: kM i is {told}"
+        why = f"{point.torque_Nm:.4g} N m with the motion, where friction alone acts against it"
+        text = f"the sign of the current is turned, or that of the speed: kM i is {why}"
         yield Finding(subject="current against the motion", passed=False, text=text)
     yield from check_record(design, run.record)
     for other in imported.runs:
@@ -180,8 +180,8 @@ def campaign_items(
     why = "".join(f"run {run.id}: {run.reason}" for run in aside[:1])
     why += f"; set aside are runs {', '.join(run.id for run in aside)}" if len(aside) > 1 else ""
     passed = None if aside else True
-    found, told = fit.renamed(IN_MOTION), [IN_MOTION[name] for name in NAMES if name not in fit.fixed]
-    compared = [design_value(design, found, one, default_value(design, one)) for one in told]
+    found, names = fit.renamed(IN_MOTION), [IN_MOTION[name] for name in NAMES if name not in fit.fixed]
+    compared = [design_value(design, found, one, default_value(design, one)) for one in names]
     items = []
     if design.load.path != "self-locking" and any(point.load_Nm for point in fit.points):
         reason = (

@@ -32,7 +32,7 @@ from analyses.records.record import Record
 
 EXPLAINED = 0.01  # level above which a cause explains what is off
 LEAST_VALUES = 3
-ALIKE = 0.02
+PROPORTIONAL = 0.02
 """Relative standard deviation within which a cause has to explain: rough numbers of a design that are off
 alike by chance are no cause."""
 FEW = 2.0  # least factor of a cause that only two values tell
@@ -84,9 +84,9 @@ def design_values(
     if design.coupling is not None and friction is not None:  # taken off the torque that a wrong scale is in
         ratio = design.ratio_to_coupling
         behind = {"viscous": friction.viscous_Nms_rad / ratio**2, "dry": friction.dry_torque_Nm / ratio}
-    told = [name for name in model.names if not name.startswith(("offset", "map_", "gravity"))]
-    before = {name: default_value(design, name) for name in told}
-    found = [design_value(design, model, n, before[n], behind.get(n.partition("_")[0], 0.0)) for n in told]
+    names = [name for name in model.names if not name.startswith(("offset", "map_", "gravity"))]
+    before = {name: default_value(design, name) for name in names}
+    found = [design_value(design, model, n, before[n], behind.get(n.partition("_")[0], 0.0)) for n in names]
     found.append(_gravity_value(design, model))
     whole = [record for record in records if {"voltage", "current"} <= set(record.signals)]
     own = {"resistance": motor.resistance_ohm, "back_emf": motor.back_emf_constant_Vs_rad}
@@ -95,8 +95,8 @@ def design_values(
         with suppress(InputError):  # R and kE are not told apart
             electrical = fit_electrical(start, whole, model.asked)
             likes = [like for like in model.simulated if {"voltage", "current"} <= set(like.signals)]
-            alike = replace(model, simulated=tuple(likes) if len(likes) == len(whole) else ())
-            electrical = without_own_bias(electrical, start, whole, alike, model.asked)
+            cosine = replace(model, simulated=tuple(likes) if len(likes) == len(whole) else ())
+            electrical = without_own_bias(electrical, start, whole, cosine, model.asked)
             if any(one_phase(start, record) for record in whole):  # R hangs on the voltage in between
                 del own["resistance"]
             found += [design_value(design, electrical, name, value or 0.0) for name, value in own.items()]
@@ -142,20 +142,20 @@ def cause(values: Sequence[DesignValue]) -> tuple[str, float, float] | None:
     ('the scale of the current or the torque constant (and back-EMF constant)', 0.8)
     """
     x = np.log([one.ratio for one in values])
-    close = np.array([float(np.hypot(one.error / one.ratio, ALIKE)) for one in values])
+    close = np.array([float(np.hypot(one.error / one.ratio, PROPORTIONAL)) for one in values])
     std = np.array([float(np.hypot(one.error / one.ratio, one.allowed)) for one in values])
     if len(values) < LEAST_VALUES or chi2.sf(float(np.sum((x / std) ** 2)), len(x)) > NO_CHANCE:
         return None
-    off = np.array([not one.within(ALIKE) for one in values])
+    off = np.array([not one.within(PROPORTIONAL) for one in values])
     fitting: list[tuple[float, str, float, float]] = []
     for words, powers in CAUSES.items():
         g = np.array([powers.get(one.name.partition("_")[0], 0.0) for one in values])
         a, b = g / close, x / close
-        told = np.count_nonzero(g)
+        count = np.count_nonzero(g)
         if np.count_nonzero(off[g != 0.0]) < 2:
             continue  # one value that is off says that this value is off, no more
         factor = float(a @ b) / float(a @ a)
-        if told < LEAST_VALUES and abs(factor) < log(FEW):
+        if count < LEAST_VALUES and abs(factor) < log(FEW):
             continue
         level = float(chi2.sf(float(np.sum((b - factor * a) ** 2)), len(x) - 1))
         if level > EXPLAINED:
@@ -163,8 +163,8 @@ def cause(values: Sequence[DesignValue]) -> tuple[str, float, float] | None:
     if not fitting:
         return None
     level, _, factor, error = max(fitting)
-    alike = " or ".join(words for other, words, *_ in fitting if other > level - 1e-9)
-    return alike, exp(factor), error * exp(factor)
+    cosine = " or ".join(words for other, words, *_ in fitting if other > level - 1e-9)
+    return cosine, exp(factor), error * exp(factor)
 
 
 STEP = 0.1
@@ -187,10 +187,10 @@ def at_constant(fit: Fit, design: Design) -> str:
     return f" at {FIELDS[one.key].symbol} = {fit[name]:g} {unit}"
 
 
-def kept_constant(design: Design, name: str, fit: Fit, shares: Floats, told: str = "") -> dict[str, Fixed]:
+def kept_constant(design: Design, name: str, fit: Fit, shares: Floats, why: str = "") -> dict[str, Fixed]:
     """A constant (or load friction) kept at the design's, by its name; none where no value hangs on it.
 
-    ``shares``: relative change of each value of the fit over that of the constant; ``told``: what a record
+    ``shares``: relative change of each value of the fit over that of the constant; ``why``: what a record
     says of it.
     """
     each: dict[str, list[str]] = {}
@@ -209,7 +209,7 @@ def kept_constant(design: Design, name: str, fit: Fit, shares: Floats, told: str
     read = f"{constants.partition('-')[0]} read as DC: {1.0 / DC_PER_A[constants]:.2f} times"
     scale = f", nor the scale of the current ({read})" * (name == "torque_constant")
     value = parameter_value(design, parameter(name).key)
-    reason = told or f"these records do not tell it{scale}: values and intervals are those at the design's"
+    reason = why or f"these records do not tell it{scale}: values and intervals are those at the design's"
     moves = {n: part * fit[n] / value for n, part in zip(fit.names, shares.tolist(), strict=True)}
     in_model = getattr(design.effective_motor, CONSTANTS.get(name, ""), value)  # an AC motor's: A dc
     reason = f"{reason}; {100.0 * STEP:+.2g} % of it is {words}"

@@ -10,7 +10,7 @@ from actuator_lti.errors import InputError, NumericalError
 from actuator_lti.types import Floats, Mask
 from analyses.correlation.closed_loop import with_zero
 from analyses.correlation.following import PLACES, Followed, followed
-from analyses.estimation.least_squares import covariance_of, independent, information_of, solve, told_apart
+from analyses.estimation.least_squares import covariance_of, identifiable, independent, information_of, solve
 from analyses.estimation.parameters import Parameter, parameter
 from analyses.estimation.series import correlation_time
 from analyses.identification.friction_law import Bend, bend_of, kept_columns
@@ -26,7 +26,7 @@ from analyses.identification.rows import (
     record_rows,
     rows_under,
 )
-from analyses.records.consistency import ALIKE, SURE, Finding, clock_doubt, resistance_doubt
+from analyses.records.consistency import PROPORTIONAL, SURE, Finding, clock_doubt, resistance_doubt
 from analyses.records.naming import KNOWN_UNITS, RATES
 from analyses.records.record import Record, lasting
 
@@ -101,8 +101,8 @@ def diagnosed(
     for record, part in zip(used, model.records, strict=True):
         model = _with_doubts(design, start, record, seen.get(record.name), model)
         if not is_benchmark(record):
-            told, added = _drift(part, model, parameter("offset", design.axis))
-            found[record.name] += told
+            drifts, added = _drift(part, model, parameter("offset", design.axis))
+            found[record.name] += drifts
             model = replace(model, covariance=model.covariance + added)
     bend = None if any(map(is_benchmark, used)) else bend_of(model)
     if bend is not None:
@@ -138,7 +138,7 @@ def _with_lags(model: JointModel, lags: Sequence[tuple[Lag, float]]) -> JointMod
 def _followed(start: Design, record: Record, simulated: Mapping[str, Floats]) -> Followed | None:
     """As `followed`; where what was found does not even move as the record, by the design's own motion."""
     one = followed(start, record, simulated)
-    if one is not None and one.alike < ALIKE:
+    if one is not None and one.cosine < PROPORTIONAL:
         simulated = with_model_signals(start, simulated_part(start, record)).signals
         one = followed(start, record, simulated)
     return with_zero(start, simulated_part(start, record), one)
@@ -161,8 +161,8 @@ def _of_lag(signal: str, lag: Lag, period_s: float) -> Finding:
     subject = f"{signal.replace('_', ' ')} and motion at one time"
     late, error = 1e3 * lag.seconds, 1e3 * lag.standard_error
     if not lag.is_sure:
-        told = lag.within_s <= period_s or None
-        return Finding(subject, told, f"within {max(abs(late), 2.0 * error):.2g} ms")
+        passed = lag.within_s <= period_s or None
+        return Finding(subject, passed, f"within {max(abs(late), 2.0 * error):.2g} ms")
     which = "later" if late > 0.0 else "earlier"
     text = f"the {signal} is {abs(late):.3g} ms (standard error {error:.1g} ms) {which} than the motion"
     return Finding(subject, None, f"{text}: taken back by as much before the fit", done="taken back")
@@ -177,18 +177,18 @@ def _drift(part: RecordFit, model: JointModel, offset: Parameter) -> tuple[list[
     table = np.column_stack([every, time * (w @ model.values), time])
     if len(table) <= table.shape[1] or len(independent(table)) < table.shape[1]:
         return [], moved
-    found, told = solve(table, part.noise), []
+    found, changes = solve(table, part.noise), []
     scale, shift = found.values[-2:]
     sure = np.abs(found.values[-2:]) > SURE * np.sqrt(np.diag(found.correlated))[-2:]
     if sure[0]:
-        told.append(f"all torques change by {200.0 * scale:+.2g} % from begin to end")
+        changes.append(f"all torques change by {200.0 * scale:+.2g} % from begin to end")
         moved = np.outer(model.values, model.values) * scale**2 / 3.0
     if sure[1]:
-        told.append(f"the offset by {2.0 * offset.scale * shift:+.2g} {offset.unit}")
+        changes.append(f"the offset by {2.0 * offset.scale * shift:+.2g} {offset.unit}")
         if "offset" in model.names:
             moved[model.names.index("offset"), model.names.index("offset")] += shift**2 / 3.0
-    text = f"{' and '.join(told)}: the intervals hold it"
-    return [Finding("drift along the record", None, text, done="widened")] * bool(told), moved
+    text = f"{' and '.join(changes)}: the intervals hold it"
+    return [Finding("drift along the record", None, text, done="widened")] * bool(changes), moved
 
 
 def flat_tops(values: Floats) -> Mask:
@@ -275,7 +275,7 @@ def lag_of(design: Design, record: Record, simulated: Record, model: JointModel)
             return None
         both = own.shared(other)
         z = other.at(both, slopes(simulated, other, driven_rows(design, simulated, other)))
-        if len(z) <= z.shape[1] or len(told_apart(z, (*model.names, "lag"))[0]) < z.shape[1]:
+        if len(z) <= z.shape[1] or len(identifiable(z, (*model.names, "lag"))[0]) < z.shape[1]:
             return None
         lag, error, driven = 0.0, np.inf, driven_rows(design, record, own)
         known = driven(record) - own.y + model.kept(own)

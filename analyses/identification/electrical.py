@@ -10,7 +10,7 @@ from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
 from actuator_lti.types import Floats
 from analyses.estimation.fit import Fit, Fixed
-from analyses.estimation.least_squares import scaled_lstsq, solve, told_apart, wider_covariance
+from analyses.estimation.least_squares import identifiable, scaled_lstsq, solve, wider_covariance
 from analyses.estimation.parameters import parameter
 from analyses.identification.joint_model import JointModel, Recipe
 from analyses.identification.rows import motion_of, recipe_for, stands
@@ -57,35 +57,35 @@ def fit_electrical(
     of_lag = whole["resistance"] * late_s
     if value > SHOWN * np.hypot(std, of_lag):
         return whole
-    told = NOT_SHOWN.format(value, std)
+    why = NOT_SHOWN.format(value, std)
     if value > SHOWN * std:
-        told = f"a current {1e3 * late_s:.2g} ms late makes {of_lag:.2g} H of the {value:.2g} H found"
+        why = f"a current {1e3 * late_s:.2g} ms late makes {of_lag:.2g} H of the {value:.2g} H found"
     rest = [name for name in whole.names if name != "inductance"]
     fit, others = whole.renamed({name: name for name in rest}), [whole.names.index(name) for name in rest]
-    fixed = {**whole.fixed, "inductance": kept_inductance(design, told)}
+    fixed = {**whole.fixed, "inductance": kept_inductance(design, why)}
     return replace(whole, **{**vars(fit), "at_once": whole.at_once[others], "fixed": fixed})
 
 
-def kept_inductance(design: Design, told: str) -> Fixed:
+def kept_inductance(design: Design, why: str) -> Fixed:
     """The design's own, where records do not tell it, for a reason."""
-    return Fixed(value=design.motor.inductance_H or 0.0, reason=f"{told}: the design's value kept")
+    return Fixed(value=design.motor.inductance_H or 0.0, reason=f"{why}: the design's value kept")
 
 
 def _fitted(late: Sequence[Floats], early: Sequence[Floats], only: tuple[str, ...]) -> ElectricalFit:
     """The fit of some parameters, in error by what a voltage that acts at once would make of them."""
     w, u = _columns(late, only)
-    kept, left = told_apart(w, only)
+    kept, left = identifiable(w, only)
     for one in left:
         if one.name in ("resistance", "back_emf"):
             raise InputError(f"{parameter(one.name).key}: {one}; {_instead(one.moves, w, u, only)}")
     result = solve(w[:, kept], u)
     names = tuple(only[k] for k in kept)
     moved = result.values - scaled_lstsq(*_columns(early, names))
-    told = [_residual(table, names, result.values) for table in late]
+    residuals = [_residual(table, names, result.values) for table in late]
     return ElectricalFit(
         names=names,
         values=result.values,
-        covariance=wider_covariance(told) + np.outer(moved, moved) / 3.0,
+        covariance=wider_covariance(residuals) + np.outer(moved, moved) / 3.0,
         fixed={one.name: Fixed(value=0.0, reason=str(one)) for one in left},
         relative_residual=float(np.linalg.norm(result.residual) / np.linalg.norm(u)),
         columns=names,
@@ -105,14 +105,14 @@ def _instead(moves: Mapping[str, float], w: Floats, u: Floats, names: Sequence[s
     if moves or np.any(w[:, speed]):
         return "vary speed and load, not together only"
     rest = [k for k, name in enumerate(names) if name != "back_emf" and np.any(w[:, k])]
-    kept = [rest[k] for k in told_apart(w[:, rest], [names[k] for k in rest])[0]]
+    kept = [rest[k] for k in identifiable(w[:, rest], [names[k] for k in rest])[0]]
     result, parts = solve(w[:, kept], u), []
     for k, value, std in zip(kept, result.values, np.sqrt(np.diag(result.correlated)), strict=True):
         one = parameter(names[k])
         if one.key:
             parts.append(f"{one.key} = {value:.4g} {one.unit} (standard error {std:.2g})")
-    told = f"of the motor held fast the record tells {', '.join(parts)}, " if parts else ""
-    return f"{told}and neither kE nor inertia and friction: these take a record that moves"
+    why = f"of the motor held fast the record tells {', '.join(parts)}, " if parts else ""
+    return f"{why}and neither kE nor inertia and friction: these take a record that moves"
 
 
 def _columns(tables: Sequence[Floats], names: Sequence[str]) -> tuple[Floats, Floats]:
@@ -149,14 +149,14 @@ def without_own_bias(
     bias = again[picked] - np.array([known[name] for name in fit.names])
     if not model.bias or np.any(np.abs(bias) > LARGEST_BIAS * np.abs(fit.values) + fit.standard_errors):
         return replace(fit, covariance=fit.covariance + np.outer(bias, bias))
-    told = []
+    parts = []
     for measured, modelled in zip(own, other, strict=True):
         (_, rest), (z, like) = _residual(measured, columns, values), _residual(modelled, columns, again)
-        told.append((z, rest - like))
+        parts.append((z, rest - like))
     return replace(
         fit,
         values=values[picked] - bias,
-        covariance=wider_covariance(told)[np.ix_(picked, picked)] + np.outer(fit.at_once, fit.at_once) / 3.0,
+        covariance=wider_covariance(parts)[np.ix_(picked, picked)] + np.outer(fit.at_once, fit.at_once) / 3.0,
         bias=dict(zip(fit.names, bias.tolist(), strict=True)),
     )
 

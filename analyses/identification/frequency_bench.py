@@ -77,12 +77,12 @@ def identify_frequency(
     play_record = None if play_record is None else prepared(play_record)
     if "angle" not in record.signals:
         raise InputError("the motor angle is needed for a frequency response", where=record.name)
-    torque, source, told, back_emf = drive_of(design, record)
+    torque, source, origin, back_emf = drive_of(design, record)
     if back_emf:
         raise InputError("a frequency response needs the current, not the voltage", where=record.name)
     command = next((name for name in COMMANDS if name in record.signals), "current")
     period = two_mass.period_of_excitation(record, command) if period_s is None else period_s
-    signals, used = {**record.signals, "torque_at_motor": torque}, {source: f"drive: {told}"}
+    signals, used = {**record.signals, "torque_at_motor": torque}, {source: f"drive: {origin}"}
     names = ["torque_at_motor", "angle"]
     if "output_angle" in record.signals:
         names.append("load_angle")
@@ -102,14 +102,14 @@ def identify_frequency(
     findings = {one.name: check_record(design, one) for one in (record, play_record) if one is not None}
     items = [verdict.inputs_item(name, result) for name, result in findings.items()]
     why = "play, friction or another resonance: excite on one flank, in motion"
-    told = f"misfit {fit.misfit:.2f} of its noise, {MISFIT_LIMIT:g} allowed"
-    label = f"The two-mass model explains the lines ({told})"
+    origin = f"misfit {fit.misfit:.2f} of its noise, {MISFIT_LIMIT:g} allowed"
+    label = f"The two-mass model explains the lines ({origin})"
     items.append(Item.of("misfit", label, "" if fit.misfit <= MISFIT_LIMIT else why))
     items += verdict.kept_items(fit, held)
     if play is not None:
         dry = (design.load.friction or LoadFriction()).dry_torque_Nm
-        told = f"the play is that at the design's load.friction.dry_torque, {dry:g} N m; more adds to it"
-        items.append(Item.unproven("kept-load_dry", "Dry friction of the load", told))
+        origin = f"the play is that at the design's load.friction.dry_torque, {dry:g} N m; more adds to it"
+        items.append(Item.unproven("kept-load_dry", "Dry friction of the load", origin))
     items.append(_written_item(read_design_text(write_design(made)), lines, record.name, fit.reaction))
     return FrequencyResult(
         record=record,
@@ -217,7 +217,7 @@ def _made(design: Design, fit: TwoMass, play: Play | None, record: str) -> Desig
     old = design.coupling or Coupling(stiffness_Nm_rad=fit["stiffness"])
     coupling = replace(old, stiffness_Nm_rad=fit["stiffness"], damping_Nms_rad=fit["damping"])
     if play is not None:
-        coupling = replace(coupling, play_rad=max(2.0 * play.half_rad, 0.0) if play.told else 0.0)
+        coupling = replace(coupling, play_rad=max(2.0 * play.half_rad, 0.0) if play.determined else 0.0)
     friction = replace(design.load.friction or LoadFriction(), viscous_Nms_rad=fit["load_viscous"])
     base = replace(design, coupling=coupling, load=replace(design.load, friction=friction))
     slopes, values, sides = {}, {}, _besides(base)
@@ -225,6 +225,6 @@ def _made(design: Design, fit: TwoMass, play: Play | None, record: str) -> Desig
         key, (others, slope) = parameter(name).key, sides.get(name, (0.0, 1.0))
         slopes[key], values[key] = {name: slope}, slope * (fit[name] - others)
     made = fit.mapped(slopes, values)
-    if play is not None and play.told:
+    if play is not None and play.determined:
         made = made.beside("coupling.play", 2.0 * play.half_rad, 2.0 * play.half_std_rad)
     return design_with_fit(base, made, f"frequency response of {record}{at_constant(fit, design)}")

@@ -139,8 +139,8 @@ def bend_of(model: JointModel) -> Bend:
     if model.form == "symmetric" and model.knots_rad_s is None:
         terms = [*bends, _term(model, np.inf)]
     surest = max(terms, key=lambda one: one.errors)
-    told = [one.own for one in bends if len(one.own)]
-    turned = [np.arccos(np.clip(one @ other, -1.0, 1.0)) for one, other in pairwise(told)]
+    directions = [one.own for one in bends if len(one.own)]
+    turned = [np.arccos(np.clip(one @ other, -1.0, 1.0)) for one, other in pairwise(directions)]
     freedom, ends = surest.blocks - 1, 1 + len(terms) - len(bends)
     chance = 2.0 * ends * t.sf(surest.errors, freedom)
     chance += sum(turned) / np.pi * (1.0 + surest.errors**2 / freedom) ** (0.5 * (1 - freedom))

@@ -14,9 +14,9 @@ from analyses.estimation.least_squares import (
     Solution,
     by_record,
     covariance_of,
+    identifiable,
     information_of,
     solve,
-    told_apart,
 )
 from analyses.estimation.parameters import default_value, own_std, parameter
 from analyses.identification.joint_model import FrictionForm, JointModel, Recipe, RecordFit, Rows
@@ -99,7 +99,7 @@ def _fitted(
         raise InputError(f"{unknown[0]}: no parameter of this model; there are: {', '.join(names)}")
     fixed = {name: Fixed(value=value, reason="fixed as asked") for name, value in held.items()}
     problem = _Problem(blocks, [name for name in names if name not in fixed], fixed)
-    kept, left = told_apart(problem.columns(problem.free), problem.free)
+    kept, left = identifiable(problem.columns(problem.free), problem.free)
     for one in left:
         moves = {name: -factor for name, factor in one.moves.items()}
         moved = " and ".join(f"{name} by {factor:.3g} times it" for name, factor in moves.items())
@@ -156,7 +156,7 @@ def _of_fixed(design: Design, free: tuple[str, ...], fixed: Mapping[str, Fixed])
 
 def _single(block: Rows, problem: _Problem, found: Mapping[str, float]) -> tuple[Fit, Floats]:
     """One record fitted alone, and its residual: what it tells, the rest held at what all gave."""
-    kept, left = told_apart(block.columns(problem.free), problem.free)
+    kept, left = identifiable(block.columns(problem.free), problem.free)
     rest = {one.name: Fixed(value=found[one.name], reason="determined by other records") for one in left}
     own = tuple(problem.free[k] for k in kept)
     result = _Problem([block], own, {**problem.fixed, **rest}).solved(np.ones(1))
@@ -177,13 +177,13 @@ def _model(design: Design, problem: _Problem, solution: Solution, weights: Float
         left |= {"inputs": np.column_stack([block.speed, block.acceleration]), "friction": block.y - other}
         left |= {"names": free, "w": block.columns(free), "compared": np.ones(len(own), dtype=bool)}
         parts.append(RecordFit(**{**vars(block), **left}))
-    told = [information_of(g * one.w, g * one.own_residual) for g, one in zip(weights, parts, strict=True)]
+    each = [information_of(g * one.w, g * one.own_residual) for g, one in zip(weights, parts, strict=True)]
     drive = np.concatenate([block.y for block in blocks])
     model = JointModel(
         names=free,
         values=solution.values,
         white_errors=np.sqrt(np.diag(solution.white)),
-        covariance=covariance_of(told),
+        covariance=covariance_of(each),
         between={},
         fixed=dict(problem.fixed),
         relative_residual=float(np.linalg.norm(np.concatenate(rests)) / np.linalg.norm(drive)),

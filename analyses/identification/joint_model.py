@@ -198,7 +198,7 @@ class JointModel(Fit):
     knots_rad_s: tuple[float, ...] | None = None
     weights: tuple[float, ...] = ()
     bias: Mapping[str, float] = field(default_factory=dict)  # taken off each value as the fit's own
-    bias_told: str = ""  # how, or why not
+    bias_note: str = ""  # how, or why not
     noise_share: float = 0.0  # of what tells the inertia: noise of recorded motions, taken off as well
     # the records as the design simulates them that comes of it; none: it cannot
     simulated: tuple[Record, ...] = field(default=(), repr=False)

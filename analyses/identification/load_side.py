@@ -25,7 +25,7 @@ class TwoSides:
     motor: Motion  # at the motor shaft
     load: Motion  # at the coupling's own shaft
     torque: Floats  # what the coupling carries without a moment at the output, ``J_l dW/dt + T_f,load``
-    told: str  # where the load's motion comes from
+    note: str  # where the load's motion comes from
     used: Mapping[str, str] = field(default_factory=dict)  # which signal it takes
 
 
@@ -48,13 +48,13 @@ def two_sides(
         twist = design.ratio_to_coupling / coupling.stiffness_Nm_rad * (torque - moment / behind)
         extra = recipe.motion(twist, record.period_s)
         motor = Motion(**{name: values + vars(extra)[name] for name, values in vars(motion).items()})
-        told = "load's own motion, the motor's by the design's stiffness"
-        return TwoSides(motor=motor, load=load, torque=torque, told=told)
-    load, told, used = _follows(design, coupling, record, motion, moment), "by the design's coupling", {}
+        note = "load's own motion, the motor's by the design's stiffness"
+        return TwoSides(motor=motor, load=load, torque=torque, note=note)
+    load, note, used = _follows(design, coupling, record, motion, moment), "by the design's coupling", {}
     if (measured := _measured(design, record, load, moment, recipe)) is not None:
-        load, told, used = measured, "of the output's encoder", {"output_angle": "load's motion"}
-    told = f"load's motion {told}"
-    return TwoSides(motor=motion, load=load, torque=_of_load(design, load), told=told, used=used)
+        load, note, used = measured, "of the output's encoder", {"output_angle": "load's motion"}
+    note = f"load's motion {note}"
+    return TwoSides(motor=motion, load=load, torque=_of_load(design, load), note=note, used=used)
 
 
 def _of_load(design: Design, load: Motion) -> Floats:

@@ -80,16 +80,18 @@ def identify_response(
     model, grows = loop_model(start, loop, of, measured)
     known = bool(np.all(np.isfinite(measured.deviation) & (measured.deviation > 0.0)))
     size = np.abs(measured.response) * (measured.deviation / np.sqrt(2.0) if known else 1.0)
-    alike = not known or bool(np.ptp(measured.deviation) == 0.0)
-    seen = Seen(measured=measured.response, size=size, known=known, alike=alike, model=model, grows=grows)
+    relative = not known or bool(np.ptp(measured.deviation) == 0.0)
+    seen = Seen(
+        measured=measured.response, size=size, known=known, relative=relative, model=model, grows=grows
+    )
     held = {key: Fixed(value=value, reason="fixed as asked") for key, value in (fixed or {}).items()}
     if start.load.inertia_kgm2 == 0.0:
         held.setdefault("load.inertia", Fixed(value=0.0, reason="0 in the design: kept"))
     names = tuple(key for key in KEYS if key in paths_of(start) and key not in held)
     if (numbers := 2 * len(size)) <= (unknowns := len(names)):  # no degrees of freedom, no interval
-        told = f"{len(size)} frequencies are {numbers} numbers for {unknowns} unknowns"
+        said = f"{len(size)} frequencies are {numbers} numbers for {unknowns} unknowns"
         allowed = f"{unknowns // 2 + 1} frequencies or more, or fewer unknowns (--fix KEY=VALUE)"
-        raise InputError(f"{told}: no interval can be given; allowed: {allowed}", where=measured.name)
+        raise InputError(f"{said}: no interval can be given; allowed: {allowed}", where=measured.name)
     fit = determined(start, names, seen, progress)
     kept = [key for key, one in fit.fixed.items() if one.value]
     scales = [name for name, one in CONSTANTS.items() if getattr(start.motor, one) is not None]
@@ -101,7 +103,7 @@ def identify_response(
         given[key] = replace(given[key], reason=f"{given[key].reason}; {words}")
     hanging, constant = fit.fixed.keys() & given.keys(), at_constant(replace(fit, fixed=given), start)
     made = _written(start, fit, given, f"frequency response {measured.name}{constant}")
-    given |= {key: _told(start, key, given[key]) for key in hanging}
+    given |= {key: _determined(start, key, given[key]) for key in hanging}
     fit = replace(fit, covariance=fit.joint, fixed={**held, **fit.fixed, **given})
     modelled = loop_model(read_design_text(write_design(made)), loop, of, measured)[0]({})[0]
     error = float(np.sqrt(np.mean(np.abs(modelled / measured.response - 1.0) ** 2)))
@@ -114,11 +116,11 @@ def identify_response(
     ended = "it ended at the least or largest value of its key: the response wants another"
     items += [Item.of(f"bound-{key}", f"{key} is within what its key allows", ended) for key in fit.at_bound]
     if grows({key: np.array([value]) for key, value in zip(fit.names, fit.values, strict=True)})[0]:
-        told = "what was closed while it was measured is not stable with these values: another drive"
-        items.append(Item.of("stable", "The drive that was found can be measured", told))
+        said = "what was closed while it was measured is not stable with these values: another drive"
+        items.append(Item.of("stable", "The drive that was found can be measured", said))
     if fit.also:
-        told = ", ".join(f"{key} = {value:.4g}" for key, value in fit.also.items())
-        wrong = f"{told} (SI) explain it as well: hold one of them (--fix), or measure more frequencies"
+        said = ", ".join(f"{key} = {value:.4g}" for key, value in fit.also.items())
+        wrong = f"{said} (SI) explain it as well: hold one of them (--fix), or measure more frequencies"
         items.append(Item.of("also", "No other values explain the response", wrong))
     own = {key: parameter_value(start, key) for key in fit.names}
     items += [*_far_items(start, fit, own), *_reach_items(made, start, measured), *kept_items(fit, held)]
@@ -151,8 +153,8 @@ def _reach_items(made: Design, start: Design, measured: RecordedResponse) -> Ite
     k, own, top = made.coupling.stiffness_Nm_rad, start.coupling.stiffness_Nm_rad, measured.frequency_hz[-1]
     hertz = float(np.sqrt(k / made.load_side_inertia_kgm2)) / (2.0 * np.pi)
     if k != own and hertz > top:
-        told = _beside(k, own, parameter("coupling.stiffness", start.axis).unit)
-        reason = f"measured to {top:.4g} Hz, the antiresonance is at {hertz:.4g} Hz: stiffness {told}"
+        why = _beside(k, own, parameter("coupling.stiffness", start.axis).unit)
+        reason = f"measured to {top:.4g} Hz, the antiresonance is at {hertz:.4g} Hz: stiffness {why}"
         yield Item.unproven("reach", "The measurement reaches the antiresonance", reason)
 
 
@@ -196,7 +198,7 @@ def _written(start: Design, fit: ResponseFit, given: Mapping[str, Fixed], source
     return with_correlations(made, joint)
 
 
-def _told(start: Design, key: str, kept: Fixed) -> Fixed:
+def _determined(start: Design, key: str, kept: Fixed) -> Fixed:
     """What is kept, with what its own error is in the errors of the others."""
     share = f"{100.0 * own_share(start, key, kept.value):.3g} % of it (one standard deviation"
     words = f"{share}, no tolerance is stated); the written tolerances are those at this value"

@@ -41,8 +41,8 @@ def with_noise_of_motion(design: Design, model: JointModel, records: Sequence[Re
     values, covariance = turned @ model.values, turned @ model.covariance @ turned.T
     moved = zip(model.names, (values - model.values).tolist(), strict=True)
     bias = {name: model.bias.get(name, 0.0) - one for name, one in moved}
-    told = f"{model.bias_told}; what noise of the recorded motion takes is given back"
-    return replace(model, values=values, covariance=covariance, bias=bias, bias_told=told, noise_share=share)
+    note = f"{model.bias_note}; what noise of the recorded motion takes is given back"
+    return replace(model, values=values, covariance=covariance, bias=bias, bias_note=note, noise_share=share)
 
 
 def acceleration_noise(design: Design, record: Record, recipe: Recipe) -> float:

@@ -98,9 +98,9 @@ class Sought:
                 with suppress(InputError, NumericalError):
                     tried += self._together(tried, taken) or []
         tried = [one for one in tried if one.right.model.simulated]  # of no drive that can be, none is nearer
-        if not (told := all(own is not None for own, _ in commands)):
+        if not (recorded := all(own is not None for own, _ in commands)):
             tried = [one for one in tried if one.right.model.bias] or tried
-        misses = _misses(plain, [_both_ways(one) for one in tried]) if told else _left(tried)
+        misses = _misses(plain, [_both_ways(one) for one in tried]) if recorded else _left(tried)
         best = int(np.argmin(np.sum(misses, axis=1)))
         best_one = tried[best]
         for other, more in zip(tried, misses - misses[best], strict=True):
@@ -150,8 +150,8 @@ class Sought:
             if first or all(one is own for one, own in zip(right.records, records, strict=True)):
                 break
             first, records = right, right.records
-        told = first or right
-        right = replace(right, late_s=told.late_s, findings=told.findings)
+        bounds = first or right
+        right = replace(right, late_s=bounds.late_s, findings=bounds.findings)
         return [self._with_scale_of_current(motor, right)]
 
     def _in_turn(self, records: Sequence[Record]) -> Found:
@@ -206,8 +206,8 @@ class Sought:
         parts = []
         for part, record in zip(model.records, records, strict=True):
             command = command_of(start, record)
-            told = "command of the simulated drive" + f", {record.between}" * (record.between != SMOOTH)
-            more = {} if command is None else {command.signal: told}
+            why = "command of the simulated drive" + f", {record.between}" * (record.between != SMOOTH)
+            more = {} if command is None else {command.signal: why}
             parts.append(replace(part, used={**more, **part.used}))
 
         def made(model: JointModel) -> Design:
@@ -291,8 +291,8 @@ def _settled(before: Fit, found: Fit) -> bool:
 
 
 def _with_motor(plain: Design, found: ElectricalFit, records: Sequence[Record]) -> Design:
-    told = f"voltage equation of {names_of(records)}"
-    return to_design.design_with_fit(plain, found.mapped(electrical_slopes(plain, found)), told)
+    source = f"voltage equation of {names_of(records)}"
+    return to_design.design_with_fit(plain, found.mapped(electrical_slopes(plain, found)), source)
 
 
 def names_of(records: Sequence[Record]) -> str:

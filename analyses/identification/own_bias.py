@@ -60,14 +60,14 @@ def without_bias(
             made = make(less)
             reason = "" if driven else _cannot(made, records)
             if reason:
-                return replace(model, bias_told=reason)
+                return replace(model, bias_note=reason)
             driven = driven or tuple(_driven(made, record) for record in records)
             less = replace(less, simulated=tuple(with_model_signals(made, record) for record in driven))
             pairs = zip(less.simulated, model.records, strict=True)
             # without an output's encoder (free of noise) that the measured one left out
             again = fit([one.without({"output_angle"} - part.used.keys()) for one, part in pairs])
         except (InputError, NumericalError) as error:
-            return replace(less, bias_told=f"not taken off: {error}")
+            return replace(less, bias_note=f"not taken off: {error}")
         before, less = less, replace(_corrected(start, made, model, again, learnt), simulated=less.simulated)
         if not less.bias or np.all(np.abs(less.values - before.values) < SETTLED * less.standard_errors):
             break
@@ -93,14 +93,14 @@ def _corrected(start: Design, made: Design, model: JointModel, again: JointModel
     triples = list(zip(model.weights, model.records, parts, strict=True))
     weighed = [(weight * part.w[part.compared], weight * part.noise) for weight, _, part in triples]
     rest = [weight * own.residual[part.compared] for weight, own, part in triples]
-    more = scaled_lstsq(np.concatenate([told for told, _ in weighed]), np.concatenate(rest))
+    more = scaled_lstsq(np.concatenate([slopes for slopes, _ in weighed]), np.concatenate(rest))
     less = replace(model, values=model.values + more, records=parts)
     found = {n: again[n] - default_value(made, n, start) for n in model.names if n in again.names}
     bias = np.array([found.get(name, 0.0) for name in model.names])
-    table = np.concatenate([told for told, _ in weighed])
+    table = np.concatenate([slopes for slopes, _ in weighed])
     if np.linalg.norm(table @ bias) > LARGEST_BIAS * np.linalg.norm(table @ model.values):
-        told = f"not taken off: more than {100 * LARGEST_BIAS:g} % of the drive"
-        return replace(less, bias_told=f"{told}; the intervals hold it").wider(bias)
+        slopes = f"not taken off: more than {100 * LARGEST_BIAS:g} % of the drive"
+        return replace(less, bias_note=f"{slopes}; the intervals hold it").wider(bias)
     singles = zip(model.alone, again.alone, weighed, strict=False)
     less = replace(
         less,
@@ -108,7 +108,7 @@ def _corrected(start: Design, made: Design, model: JointModel, again: JointModel
         covariance=wider_covariance(weighed),
         alone=tuple(_alone(*each, partial(default_value, made, start=start), model) for each in singles),
         bias=dict(zip(model.names, bias.tolist(), strict=True)),
-        bias_told="found on records simulated with the result, and taken off",
+        bias_note="found on records simulated with the result, and taken off",
     )
     less = less.wider(_not_shared(model, again) * bias) if learnt else less
     return with_scatter(start, less.wider(_by_direction(model, again)))
@@ -147,11 +147,11 @@ def _with_noise(measured: RecordFit, simulated: RecordFit) -> RecordFit:
     own, model = (part.at(both, part.own_residual) for part in (measured, simulated))
     table, seen = (measured.at(both, each) for each in (measured.w, measured.inputs))
     on = simulated.at(both, simulated.w)
-    told, free = (on @ scaled_lstsq(on, each) for each in (table, seen))
+    projected, free = (on @ scaled_lstsq(on, each) for each in (table, seen))
     compared = np.pad(both, (0, more))[measured.keep]
     w, inputs = measured.w.copy(), measured.inputs.copy()
-    w[compared], inputs[compared] = told, free
-    noise = own - table @ scaled_lstsq(told, own) - model
+    w[compared], inputs[compared] = projected, free
+    noise = own - table @ scaled_lstsq(projected, own) - model
     return replace(measured, w=w, inputs=inputs, noise=noise, compared=compared)
 
 
@@ -172,8 +172,8 @@ def _alone(
     """One record fitted alone, less its bias, with the errors of its noise; ``true``: what was simulated."""
     both = tuple(name for name in own.names if name in simulated.names)
     values = np.array([own[name] - simulated[name] + true(name) for name in both])
-    told = information_of(weighed[0][:, [model.names.index(name) for name in both]], weighed[1])
-    return Fit(names=both, values=values, covariance=covariance_of([told]))
+    information = information_of(weighed[0][:, [model.names.index(name) for name in both]], weighed[1])
+    return Fit(names=both, values=values, covariance=covariance_of([information]))
 
 
 def _cannot(design: Design, records: Sequence[Record]) -> str:

@@ -12,7 +12,7 @@ from actuator_lti.errors import InputError
 from actuator_lti.types import Floats, Progress
 from analyses.correlation.closed_loop import nearest_run
 from analyses.estimation.fit import COVERAGE, Fit
-from analyses.estimation.least_squares import Information, covariance_of, information_of, told_apart
+from analyses.estimation.least_squares import Information, covariance_of, identifiable, information_of
 from analyses.estimation.parameters import default_value
 from analyses.identification.joint_model import JointModel, Rows
 from analyses.identification.rows import record_rows
@@ -96,7 +96,7 @@ def plan_motions(
         if progress is not None:
             progress(k, len(family))
     every = made[0][-1].names
-    kept, _ = told_apart(np.concatenate([rows.w for *_, rows in made]), every)
+    kept, _ = identifiable(np.concatenate([rows.w for *_, rows in made]), every)
     names = tuple(every[k] for k in kept)
     segments = [
         Segment(

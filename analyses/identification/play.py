@@ -9,7 +9,7 @@ from scipy.ndimage import binary_erosion
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
 from actuator_lti.types import Floats, Mask
-from analyses.estimation.least_squares import solve, told_apart
+from analyses.estimation.least_squares import identifiable, solve
 from analyses.estimation.parameters import own_std
 from analyses.identification.two_mass import TwoMass
 from analyses.records.differentiation import filtered_motion
@@ -36,7 +36,7 @@ class Play:
     rows: int  # that were in contact
 
     @property
-    def told(self) -> bool:
+    def determined(self) -> bool:
         """Whether the play is beyond twice its own error."""
         return self.half_rad > 2.0 * self.half_std_rad
 
@@ -85,7 +85,7 @@ def _play_with(design: Design, record: Record, fit: TwoMass, values: Mapping[str
         torque = inertial + friction @ np.array([own["viscous"], own["dry"]])
         touching = _in_contact(torque, twist - middle, half, round(GUARD / (cutoff * period)))
         w = np.column_stack([np.ones_like(torque), np.sign(torque), friction / k])[touching]
-        kept, _ = told_apart(w, names)
+        kept, _ = identifiable(w, names)
         result = solve(w[:, kept], (twist - inertial / k)[touching])
         found = dict(zip((names[j] for j in kept), result.values.tolist(), strict=True))
         middle, half = found["middle"], found["play"]
@@ -122,6 +122,6 @@ def _in_contact(torque_Nm: Floats, twist: Floats, half: float, guard_samples: in
         touching = np.asarray(binary_erosion(touching, iterations=guard_samples))
     least = min(np.count_nonzero(side[touching] > 0.0), np.count_nonzero(side[touching] < 0.0))
     if least < LEAST_ROWS:
-        told = f"{least} rows on the rarer flank, {LEAST_ROWS} wanted"
-        raise InputError(f"{told}: the torque through the coupling must reverse and stay")
+        why = f"{least} rows on the rarer flank, {LEAST_ROWS} wanted"
+        raise InputError(f"{why}: the torque through the coupling must reverse and stay")
     return np.asarray(touching)

@@ -14,12 +14,12 @@ from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
 from actuator_lti.types import Floats, Progress
 from analyses.estimation.fit import COVERAGE, Fit, Fixed
-from analyses.estimation.least_squares import RESOLVED, told_apart
+from analyses.estimation.least_squares import RESOLVED, identifiable
 from analyses.identification.response_model import Seen
 from analyses.identification.response_search import Point, Search
 from analyses.records.consistency import SURE
 
-NOT_TOLD = "not determined, the design's value kept"
+NOT_DETERMINED = "not determined, the design's value kept"
 STARTS: tuple[float, ...] = 1.0, 0.25, 4.0
 """Stiffnesses to begin with, over the design's: an octave of the resonance to either side."""
 REACH = 30.0
@@ -144,9 +144,11 @@ def determined(start: Design, names: tuple[str, ...], seen: Seen, progress: Prog
             better.append(lower.args[0])
             continue
         if not untold:
-            fit = _told(search, [best, *others], beside, joint, ends, level)
+            fit = _determined(search, [best, *others], beside, joint, ends, level)
             own = {key: parameter_value(start, key) for key in left}
-            fixed = {key: Fixed(value=own[key], reason=f"{why}: {NOT_TOLD}") for key, why in left.items()}
+            fixed = {
+                key: Fixed(value=own[key], reason=f"{why}: {NOT_DETERMINED}") for key, why in left.items()
+            }
             return replace(fit, fixed=fixed, misfit=float(np.sqrt(variance)) if seen.known else None)
         left, better = left | untold, []
     raise InputError(f"the response determines nothing of {', '.join(left)}", where=start.name)
@@ -183,7 +185,7 @@ def _asked(start: Design, search: Search, joint: Point, level: float) -> tuple[F
     n, ends = search.count, np.zeros((search.count, 2))
     names, x = search.names[:n], joint.x[:n]
     gone = np.argsort(np.abs(x) > np.where(search.logs[:n], np.log(REACH), REACH), kind="stable")
-    _, like = told_apart(joint.slopes[:, gone], [names[k] for k in gone], least=RESOLVED)
+    _, like = identifiable(joint.slopes[:, gone], [names[k] for k in gone], least=RESOLVED)
     if like:  # the last one: of those at the end of a valley, where others do the same
         return ends, {like[-1].name: str(like[-1])}
     std = np.sqrt(np.diag(joint.covariance))[:n]
@@ -204,7 +206,7 @@ def _asked(start: Design, search: Search, joint: Point, level: float) -> tuple[F
     return ends, {}
 
 
-def _told(
+def _determined(
     search: Search, fits: Sequence[Point], beside: Search, joint: Point, ends: Floats, level: float
 ) -> ResponseFit:
     """What is told, in values, of the fits at what is kept, and of the one beside it."""

@@ -30,7 +30,7 @@ ROUNDED = float(np.finfo(float).eps) ** 0.25  # how far rounding scatters four e
 class Seen:
     """A measured response, shape (F,), the deviation of each of its parts (1: not known), and the model.
 
-    ``alike``: the deviation is one share of each true value. Over the measured one it would have too much
+    ``relative``: the deviation is one share of each true value. Over the measured one it would have too much
     weight where noise made it small, and the values a bias; the logarithm has a mean of 0 of such noise.
     ``grows``: of which designs more modes grow than of the first: nobody measures them.
     """
@@ -38,7 +38,7 @@ class Seen:
     measured: Complexes
     size: Floats
     known: bool
-    alike: bool
+    relative: bool
     model: Callable[[Values], Complexes]
     grows: Callable[[Values], Mask]
 
@@ -48,7 +48,7 @@ class Seen:
 
     def off(self, values: Values) -> Floats:
         """What the responses of designs are off by, shape (K, 2 F)."""
-        return self.ratio(values) if self.alike else self.parts(self.model(values) - self.measured)
+        return self.ratio(values) if self.relative else self.parts(self.model(values) - self.measured)
 
     def ratio(self, values: Values) -> Floats:
         """The same of the logarithms: far from the truth they are straighter."""
@@ -88,7 +88,7 @@ def loop_model(
         raise InputError(f"{last:g} Hz: the loop is sampled; allowed: below {top:g} Hz", measured.name)
     z = np.exp(1j * np.pi * measured.frequency_hz / top)[:, None, None]
 
-    def alike(values: Values) -> Complexes:
+    def relative(values: Values) -> Complexes:
         made, _ = blocks(wire(stacked(design, values), Operating()))
         periodic = len(made) > 1 and of != "closed"  # of its fundamentals T is that of the blocks
         made = [block.feedback() for block in made] if periodic else made
@@ -106,7 +106,7 @@ def loop_model(
         kinds = 2 * whole + (part > 0.0)  # designs of one kind have the same states
         result = np.empty((len(kinds), len(z)), dtype=complex)
         for kind in np.unique(kinds):
-            result[kinds == kind] = alike(dict(zip(names, table[:, kinds == kind], strict=True)))
+            result[kinds == kind] = relative(dict(zip(names, table[:, kinds == kind], strict=True)))
         return result
 
     def grows(values: Values) -> Mask:

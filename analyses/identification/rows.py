@@ -64,8 +64,8 @@ def is_benchmark(record: Record) -> bool:
     """Whether a record is that of the EMPS benchmark, to the last digit: no other has published figures."""
     if "gtau" not in record.constants:
         return False
-    told = np.concatenate([record[name] for name in ("position", "force") if name in record.signals])
-    return hashlib.sha256(told.tobytes()).hexdigest() == BENCHMARK
+    values = np.concatenate([record[name] for name in ("position", "force") if name in record.signals])
+    return hashlib.sha256(values.tobytes()).hexdigest() == BENCHMARK
 
 
 def is_loaded(record: Record) -> bool:
@@ -81,8 +81,8 @@ def drive_of(design: Design, record: Record) -> tuple[Floats, str, str, bool]:
         return record["force"], "force", "recorded force", False
     for name in ("current", "current_reference"):
         if name in signals and constant is not None:
-            told = f"torque kM i, kM = {constant:g} N m/A"
-            return np.asarray(constant * record[name]), name, told, False
+            origin = f"torque kM i, kM = {constant:g} N m/A"
+            return np.asarray(constant * record[name]), name, origin, False
     name = "force_reference" if design.axis == "linear" else "torque_reference"
     if name in signals:
         return record[name], name, f"{name.replace('_reference', '')} as commanded", False
@@ -91,11 +91,11 @@ def drive_of(design: Design, record: Record) -> tuple[Floats, str, str, bool]:
         if name in signals and gain is not None:
             return np.asarray(gain * record[name]), name, f"source gain {gain:g} times the {words}", False
         if name in signals and constant is not None and ohm is not None:
-            told = f"kM (u - kE w)/R of the {words}, without the inductance"
-            return np.asarray(constant / ohm * record[name]), name, told, True
-    told = "no drive signal: force, current (kM), torque_reference, or voltage (a source gain, or kM and R)"
-    told += "; of a motor that is switched off a column of current 0"
-    raise lacking(record, told)
+            origin = f"kM (u - kE w)/R of the {words}, without the inductance"
+            return np.asarray(constant / ohm * record[name]), name, origin, True
+    origin = "no drive signal: force, current (kM), torque_reference, or voltage (a source gain, or kM and R)"
+    origin += "; of a motor that is switched off a column of current 0"
+    raise lacking(record, origin)
 
 
 def motion_of(design: Design, record: Record, recipe: Recipe) -> tuple[Motion, str]:
@@ -196,11 +196,11 @@ def record_rows(
     design, period = record.drive(shared), period_of(record)
     if too_short(record):
         lasts = f"lasts {len(record) * period:.3g} s in {len(record)} rows"
-        told = f"{lasts}: {SHORTEST_S:g} s and more are needed; is the unit of the time right?"
-        raise InputError(told, where=record.name)
+        why = f"{lasts}: {SHORTEST_S:g} s and more are needed; is the unit of the time right?"
+        raise InputError(why, where=record.name)
     if gravity and design.load.path != "back-drivable":
-        told = 'load.path = "self-locking": gravity does not turn the motor; "back-drivable" is meant'
-        raise InputError(told)
+        why = 'load.path = "self-locking": gravity does not turn the motor; "back-drivable" is meant'
+        raise InputError(why)
     recipe = recipe_for(record) if recipe is None else recipe
     own = _balance(design, record, recipe, gravity=gravity)
     motion, angle = own.motion, own.angle
@@ -261,14 +261,17 @@ def _balance(design: Design, record: Record, recipe: Recipe, *, gravity: bool) -
     if design.coupling is not None:
         sides = two_sides(design, record, place, motion, moment_of(design, record, angle)[0], recipe)
         motion, angle = sides.motor, np.asarray(sides.load.position / design.ratio_behind_coupling)
-    drive, driven_by, told = _torque(design, record, motion, recipe)
+    drive, driven_by, origin = _torque(design, record, motion, recipe)
     known, source = moment_of(design, record, angle, gravity=not gravity)
     known = recipe.other_side(known, period_of(record)) if source else known
-    used = {place: "motion", driven_by: f"drive: {told}"}
+    used = {place: "motion", driven_by: f"drive: {origin}"}
     if source:
         used[source] = "load" + (", its friction and its torque M/N" if free else ", its friction")
     if design.motor.over_angle.bends:
-        told, drive = f"{told} with the design's cogging", drive + design.motor.over_angle.at(motion.position)
+        origin, drive = (
+            f"{origin} with the design's cogging",
+            drive + design.motor.over_angle.at(motion.position),
+        )
     if free:
         drive = drive + known / design.total_ratio
     if sides is not None:
@@ -277,8 +280,8 @@ def _balance(design: Design, record: Record, recipe: Recipe, *, gravity: bool) -
         # what the load side takes but for its inertia at the motor's own pace
         own = design.load_side_inertia_kgm2 / ratio * sides.motor.acceleration / ratio
         drive = drive - (np.asarray(sides.torque / ratio - own) if free else 0.0)
-        told, used = f"{told}, {sides.told}", {**sides.used, **used}
-    return _Balance(motion, angle, drive, known, used, note=f"{place} and {told}")
+        origin, used = f"{origin}, {sides.note}", {**sides.used, **used}
+    return _Balance(motion, angle, drive, known, used, note=f"{place} and {origin}")
 
 
 def _kept(record: Record, motion: Motion, part: slice, recipe: Recipe) -> Mask:
@@ -304,7 +307,7 @@ def _torque(design: Design, record: Record, motion: Motion, recipe: Recipe) -> t
     """The drive torque as it acts: a voltage later by the computing delay and half of what it is held for."""
     motor = design.effective_motor
     constant = motor.torque_constant_Nm_A or 0.0
-    drive, driven_by, told, back_emf = drive_of(design, record)
+    drive, driven_by, origin, back_emf = drive_of(design, record)
     if driven_by.startswith("voltage") and not is_benchmark(record):
         late = design.controller.computing_delay_s + 0.5 * min(held_s(design), period_of(record))
         drive = np.interp(record.time_s - late, record.time_s, drive)
@@ -314,7 +317,7 @@ def _torque(design: Design, record: Record, motion: Motion, recipe: Recipe) -> t
     if back_emf and motor.resistance_ohm is not None:
         back = constant if motor.back_emf_constant_Vs_rad is None else motor.back_emf_constant_Vs_rad
         drive = drive - constant * back / motor.resistance_ohm * motion.velocity
-    return drive, driven_by, told
+    return drive, driven_by, origin
 
 
 def driven_rows(design: Design, record: Record, rows: Rows) -> Callable[[Record], Floats]:

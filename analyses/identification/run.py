@@ -91,7 +91,7 @@ def _of_campaign(design: Design, asked: Asked, progress: Progress) -> CampaignAn
     load = load if load > 0.0 else max(p.load_Nm for p in fit.points)
     speed = speed if math.isfinite(speed) else max(p.speed_rad_s for p in fit.points)
     suggestion = None
-    if count and len(fit.told) == len(NAMES):
+    if count and len(fit.determined) == len(NAMES):
         suggestion = suggest_runs(design, fit, count=count, criterion=asked.criterion, progress=progress)
     return CampaignAnswer(
         design=written,

@@ -13,7 +13,7 @@ from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
 from actuator_lti.types import Floats
 from analyses.estimation.fit import Fit, Fixed
-from analyses.estimation.least_squares import scaled_lstsq, told_apart, wider_covariance
+from analyses.estimation.least_squares import identifiable, scaled_lstsq, wider_covariance
 from analyses.estimation.parameters import default_value
 from analyses.identification.asked import Settings
 from analyses.identification.joint_model import NAMES, FrictionForm, JointModel, RecordFit, Rows
@@ -65,8 +65,8 @@ def switched_off(design: Design, record: Record) -> Record:
     noise = current - level
     rest = noise - table @ scaled_lstsq(table, noise)
     least, free = float(rest @ rest), len(rest) - table.shape[1]
-    told = (float(noise @ noise) - least) / table.shape[1] / (least / free) if least else 0.0
-    if not is_white(noise, record, recipe) or variance_ratio.sf(told, table.shape[1], free) < NO_CHANCE:
+    ratio = (float(noise @ noise) - least) / table.shape[1] / (least / free) if least else 0.0
+    if not is_white(noise, record, recipe) or variance_ratio.sf(ratio, table.shape[1], free) < NO_CHANCE:
         return record
     note = "the current is noise about zero, and moves nothing: taken as none, a run-down"
     if abs(level) > SURE * np.sqrt(np.mean(noise**2) / len(noise)):
@@ -135,8 +135,8 @@ def decay_of(design: Design, record: Record, *, found: bool = True) -> Decay:
     far = lasting(np.abs(speed) > SLOW * most, max(round(REST_TIME_S / period), 6))
     since, until = (np.logical_or.accumulate(far[::step])[::step] for step in (1, -1))
     if np.any(speed[since & until] < REST_SHARE * most):
-        told = "it moves again after it stood: a run-down is one decay, each a file of its own"
-        raise InputError(told, where=record.name)
+        why = "it moves again after it stood: a run-down is one decay, each a file of its own"
+        raise InputError(why, where=record.name)
     moves = speed > SLOW * np.max(speed)
     table = np.column_stack([np.ones_like(time), -period * np.cumsum(speed), -time])
     about = scaled_lstsq(table[moves], speed[moves])
@@ -204,15 +204,15 @@ def fit_run_downs(
     if settings.gravity:
         raise InputError("--gravity: a run-down shows no torque, and no pendulum", where=records[0].name)
     if (form := settings.friction) == "map":
-        told = "--friction map: of a run-down are allowed symmetric and per-direction"
-        raise InputError(told, where=records[0].name)
+        said = "--friction map: of a run-down are allowed symmetric and per-direction"
+        raise InputError(said, where=records[0].name)
     decays, names = [decay_of(design, record) for record in records], NAMES[form]
     table = _balance(decays, form)
     own = {name: held.get(name, default_value(design, name)) for name in names}
     known = [name for name in names[1:] if held.get(name)]
     inertia = "inertia" in held or not known
     free = [name for name in names if name not in held and not (inertia and name == "inertia")]
-    picked, left = told_apart(table[:, [names.index(name) for name in free]], free)
+    picked, left = identifiable(table[:, [names.index(name) for name in free]], free)
     found = tuple(free[k] for k in picked)
     values, covariance, condition = _solved(decays, table, found, own)
     total = own["inertia"] if inertia else float(values[found.index("inertia")])
@@ -247,7 +247,7 @@ def fit_run_downs(
         condition=condition,
         weights=(1.0,) * len(parts),
         form=form,
-        bias_told="no derivative is taken of what is recorded: none",
+        bias_note="no derivative is taken of what is recorded: none",
     )
 
 

@@ -9,7 +9,7 @@ from actuator_lti.errors import InputError, NumericalError
 from actuator_lti.systems.root import root
 from actuator_lti.types import Floats
 from analyses.estimation.fit import Fit, Fixed
-from analyses.estimation.least_squares import told_apart
+from analyses.estimation.least_squares import identifiable
 from analyses.estimation.parameters import parameter
 from analyses.identification.points import SteadyPoint, half_widths, shared_errors, standardised
 from analyses.records.campaign_file import Instruments
@@ -50,7 +50,7 @@ class SurfaceFit(Fit):
     freedom: int
 
     @property
-    def told(self) -> tuple[int, ...]:
+    def determined(self) -> tuple[int, ...]:
         """Positions of the coefficients that were fitted."""
         return tuple(k for k, name in enumerate(NAMES) if name not in self.fixed)
 
@@ -115,9 +115,9 @@ class _Runs:
         self.x = np.array([[1.0, p.speed_rad_s, p.load_Nm] for p in points]).reshape(-1, len(NAMES))
         self.y = np.array([p.torque_Nm for p in points])
         self.held = self._held(fixed, kept)
-        self.told = [k for k, name in enumerate(NAMES) if name not in self.held]
+        self.determined = [k for k, name in enumerate(NAMES) if name not in self.held]
         self._start = np.array([self.held[name].value if name in self.held else 0.0 for name in NAMES])
-        self.free, self.rest = self.x[:, self.told], np.asarray(self.y - self.x @ self._start)
+        self.free, self.rest = self.x[:, self.determined], np.asarray(self.y - self.x @ self._start)
 
     def _held(self, fixed: Mapping[str, float], kept: Mapping[str, float]) -> dict[str, Fixed]:
         """What was asked for, and what the runs do not tell apart; two runs more than coefficients."""
@@ -126,7 +126,7 @@ class _Runs:
         if not names:
             raise InputError("C0, Cv and CM are all fixed: nothing is left to identify")
         columns = [NAMES.index(name) for name in names]
-        left = told_apart(self.x[:, columns], names)[1] if self.points else ()
+        left = identifiable(self.x[:, columns], names)[1] if self.points else ()
         for one in left:
             why = "no run is loaded" if one.name == "CM" and not one.moves else str(one)
             held[one.name] = Fixed(value=kept.get(one.name, 0.0), reason=f"{why}: the design's value kept")
@@ -135,17 +135,17 @@ class _Runs:
             raise InputError("what is not fixed is not told by the runs: nothing is left to identify")
         if len(self.points) < coefficients + 2:
             words = ("one coefficient", "two coefficients", "three coefficients")[coefficients - 1]
-            told = f"{len(self.points)} usable runs: at least {coefficients + 2} are needed for {words}"
-            raise InputError(told)
+            said = f"{len(self.points)} usable runs: at least {coefficients + 2} are needed for {words}"
+            raise InputError(said)
         if any(one.name not in kept for one in left):
-            told = "the runs do not tell C0, Cv and CM apart: vary speed and load, not together only"
-            raise NumericalError(told)
+            said = "the runs do not tell C0, Cv and CM apart: vary speed and load, not together only"
+            raise NumericalError(said)
         return held
 
     def ordinary(self) -> Floats:
         """All coefficients, by ordinary least squares."""
         theta = self._start.copy()
-        theta[self.told] = np.linalg.lstsq(self.free, self.rest, rcond=None)[0]
+        theta[self.determined] = np.linalg.lstsq(self.free, self.rest, rcond=None)[0]
         return theta
 
     def own_variance(self, theta: Floats) -> Floats:
@@ -165,7 +165,7 @@ class _Runs:
 
     def scatter(self, own: Floats, effects: Floats) -> tuple[float, float]:
         """Variance between runs that makes chi-square equal its freedom, and the Birge ratio without it."""
-        x, y, freedom = self.free, self.rest, len(self.y) - len(self.told)
+        x, y, freedom = self.free, self.rest, len(self.y) - len(self.determined)
 
         def excess(extra: float) -> float:
             gain, covariance = self.gain(own + extra, effects)
@@ -189,8 +189,8 @@ def _fitted(
         shared, effects = shared_errors(runs.points, instruments, theta[2], torque_constant)
         scatter, birge = runs.scatter(own, effects)
         gain, change = np.zeros((len(NAMES), count)), np.zeros(len(NAMES))
-        gain[runs.told], _ = runs.gain(own + scatter, effects)
-        change[runs.told] = gain[runs.told] @ runs.rest - theta[runs.told]
+        gain[runs.determined], _ = runs.gain(own + scatter, effects)
+        change[runs.determined] = gain[runs.determined] @ runs.rest - theta[runs.determined]
         theta = theta + change
         if np.all(np.abs(change) <= 1e-12 * np.abs(theta)):
             break
@@ -198,7 +198,7 @@ def _fitted(
     random_covariance, moved = (gain * variance) @ gain.T, (gain @ effects).T
     scaled = effects / variance[:, None]  # the most likely shared errors bend the residuals together
     likely = np.linalg.solve(3.0 * np.eye(effects.shape[1]) + effects.T @ scaled, scaled.T @ residual)
-    freedom = count - len(runs.told)
+    freedom = count - len(runs.determined)
     return SurfaceFit(
         points=runs.points,
         names=NAMES,

@@ -130,10 +130,10 @@ def design_with_fit(design: Design, fit: Fit, source: str) -> Design:
         if not error.message.startswith(fit.names):
             raise
         name = max((name for name in fit.names if error.message.startswith(name)), key=len)
-        told = "the record does not tell it: it takes a longer motion, at several speeds in both directions"
+        why = "the record does not tell it: it takes a longer motion, at several speeds in both directions"
         if name.startswith("motor.") and fit[name] < -SURE * fit.std(name):
-            told = "a column has the other sign, or is another signal"
-        raise InputError(f"identified {error.message}; {told}") from error
+            why = "a column has the other sign, or is another signal"
+        raise InputError(f"identified {error.message}; {why}") from error
     parameters = dict(changed.parameters)
     for path, std in zip(fit.names, fit.standard_errors, strict=True):
         tolerance = _tolerance(path, parameters[path].value, _short(float(std)))

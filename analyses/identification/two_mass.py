@@ -47,12 +47,12 @@ def excited_lines(record: Record, names: tuple[str, ...], period_s: float) -> Li
     """
     samples = round(period_s / record.period_s)
     if samples < 8 or abs(samples * record.period_s - period_s) > 1e-3 * record.period_s:
-        told = f"must be a whole number (8 or more) of samples of {record.period_s:g} s"
-        raise InputError(f"period {period_s:g} s: {told}", where=record.name)
+        why = f"must be a whole number (8 or more) of samples of {record.period_s:g} s"
+        raise InputError(f"period {period_s:g} s: {why}", where=record.name)
     periods = len(record) // samples - 1
     if periods < MIN_PERIODS:
-        told = f"{periods} periods of {period_s:g} s after the first: at least {MIN_PERIODS}"
-        raise InputError(told, where=record.name)
+        why = f"{periods} periods of {period_s:g} s after the first: at least {MIN_PERIODS}"
+        raise InputError(why, where=record.name)
     start = len(record) - periods * samples
     blocks = np.array([record[name][start:].reshape(periods, samples) for name in names])
     rates = (blocks[:, -1].mean(axis=1) - blocks[:, 0].mean(axis=1)) / max((periods - 1) * samples, 1)
@@ -114,14 +114,14 @@ def period_of_excitation(record: Record, name: str) -> float:
     correlation = n * autocovariance(values, n - 1)
     power, early = np.cumsum(values[::-1] ** 2)[::-1], np.cumsum(values**2)
     lags = np.arange(1, n // (MIN_PERIODS + 1))
-    alike = correlation[lags] / np.sqrt(np.maximum(power[lags] * early[n - 1 - lags], 1e-300))
-    fallen = int(np.argmax(alike < 0.5))
-    peaks = np.flatnonzero(alike[fallen:] > 0.98) + fallen
-    if not len(alike) or not fallen or not len(peaks):
-        told = f"{name} does not repeat itself {MIN_PERIODS + 1} times: give the period of the excitation"
-        raise InputError(told, where=record.name)
+    repeated = correlation[lags] / np.sqrt(np.maximum(power[lags] * early[n - 1 - lags], 1e-300))
+    fallen = int(np.argmax(repeated < 0.5))
+    peaks = np.flatnonzero(repeated[fallen:] > 0.98) + fallen
+    if not len(repeated) or not fallen or not len(peaks):
+        why = f"{name} does not repeat itself {MIN_PERIODS + 1} times: give the period of the excitation"
+        raise InputError(why, where=record.name)
     group = peaks[peaks <= peaks[0] * 1.02 + 2]
-    best = group[int(np.argmax(alike[group]))]
+    best = group[int(np.argmax(repeated[group]))]
     return float(lags[best] * record.period_s)
 
 

@@ -20,8 +20,8 @@ from analyses.identification.friction_law import Bend
 from analyses.identification.joint_model import JointModel
 from analyses.identification.residuals import ResidualTest
 from analyses.records.consistency import (
-    ALIKE,
     NO_CHANCE,
+    PROPORTIONAL,
     RATE_TOLERANCE,
     SURE,
     Finding,
@@ -121,14 +121,14 @@ def law_items(bend: Bend | None, model: JointModel, axis: str, feigned: str = ""
     if bend is None:
         return
     unit, sure = "m/s" if axis == "linear" else "rad/s", f"({bend.errors:.1f} standard errors)"
-    told = f"below {bend.speed_rad_s:.3g} {unit} the friction leaves its law over the speed {sure}"
+    said = f"below {bend.speed_rad_s:.3g} {unit} the friction leaves its law over the speed {sure}"
     cure = "--friction map finds it"
     if np.isinf(bend.speed_rad_s):
-        told, cure = f"its slope differs by direction {sure}", "--friction per-direction finds it"
+        said, cure = f"its slope differs by direction {sure}", "--friction per-direction finds it"
     passed, why = (None, "the intervals hold it") if model.knots_rad_s else (False, cure)
     if feigned:
         passed, why = None, f"{why}, or {feigned}"
-    label, reason = "Friction law of the fit is that of the records", f"{told}: {why}"
+    label, reason = "Friction law of the fit is that of the records", f"{said}: {why}"
     if not bend.is_sure:
         passed, reason = True, ""
     yield Item(id="law", label=label, passed=passed, reason=reason)
@@ -138,18 +138,18 @@ def independence_items(tests: Sequence[ResidualTest]) -> Iterator[Item]:
     """Inputs on which a residual hangs, beyond chance in all that were tried."""
     asked = [test for test in tests if test.input]
     for test in (one for one in asked if len(asked) * one.chance < NO_CHANCE):
-        told = f"it hangs on it at a lag of {test.lag} rows: something is not modelled"
+        said = f"it hangs on it at a lag of {test.lag} rows: something is not modelled"
         label = f"{test.record}: residual independent of the {test.input}"
-        why = f"{told}, the intervals need not hold it"
+        why = f"{said}, the intervals need not hold it"
         yield Item.unproven(f"independent-{test.record}-{test.input}", label, why)
 
 
 def noise_items(model: JointModel) -> Iterator[Item]:
     """Noise of a recorded motion that took more from the inertia than its standard error."""
     if model.noise_share * model.get("inertia", 0.0) > model.std("inertia") > 0.0:
-        told = f"{100.0 * model.noise_share:.2g} % of its square is noise of the recorded motion, white as it"
-        told += " is from row to row, which took as much from the inertia: given back; a command tells better"
-        yield Item.unproven("noise", "Acceleration without noise", told)
+        why = f"{100.0 * model.noise_share:.2g} % of its square is noise of the recorded motion, white as it"
+        why += " is from row to row, which took as much from the inertia: given back; a command tells better"
+        yield Item.unproven("noise", "Acceleration without noise", why)
 
 
 def kept_items(fit: Fit, held: Collection[str], axis: str = "rotary") -> Iterator[Item]:
@@ -181,8 +181,8 @@ def feigned_law(*, late: bool, reversals: bool) -> str:
 def lag_items(late_s: float, late: bool) -> Iterator[Item]:
     """A current that is, or may be, later than the motion by more than a sample."""
     if late:
-        told = f"{1e3 * late_s:.2g} ms off, or not told closer: what is sure is taken back as a delay"
-        why = f"{told}; the intervals hold what a filter of first order would make of it"
+        said = f"{1e3 * late_s:.2g} ms off, or not told closer: what is sure is taken back as a delay"
+        why = f"{said}; the intervals hold what a filter of first order would make of it"
         yield Item.unproven("lag", "Current and motion at one time", why)
 
 
@@ -195,19 +195,19 @@ def phase_items(design: Design, model: JointModel, records: Sequence[Record]) ->
     shares = [f"{100.0 * one:.2g} % of {parameter(name, design.axis).label}" for name, one in moved.items()]
     rows = [record.name for record in records if one_phase(design, replace(record, between=""))]
     if shares and rows:
-        told = f"all rows of {', '.join(rows)} are at one phase of the outer loop, taken to be its tick: "
-        told += f"{', '.join(shares)} is taken off for that; log faster, or at another period"
-        yield Item.unproven("phase", "Rows at the outer loop's ticks", told)
+        why = f"all rows of {', '.join(rows)} are at one phase of the outer loop, taken to be its tick: "
+        why += f"{', '.join(shares)} is taken off for that; log faster, or at another period"
+        yield Item.unproven("phase", "Rows at the outer loop's ticks", why)
 
 
 def sampling_items(record: Record) -> Iterator[Item]:
     """Whether the current is sampled fast enough for its mean between the samples to be known, and when."""
     if record.as_read is not None:
-        told = "irregular, assumed to be right: with jitter of the stamps the inertia comes out too small"
+        why = "irregular, assumed to be right: with jitter of the stamps the inertia comes out too small"
         if lost := record.as_read.rows_missing:
             grid = f"a regular grid of {1e3 * record.period_s:.6g} ms"
-            told = f"{lost} rows are missing on {grid}, filled by straight lines"
-        yield Item.unproven(f"times-{record.name}", f"{record.name}: times of the rows", told)
+            why = f"{lost} rows are missing on {grid}, filled by straight lines"
+        yield Item.unproven(f"times-{record.name}", f"{record.name}: times of the rows", why)
     x = record.signals.get("current", np.zeros(0))
     if len(x) < 3 or not np.any(x):
         return
@@ -234,8 +234,8 @@ def size_item(design: Design, values: Sequence[DesignValue], *, kept_constants: 
     reasons = []
     if explained := cause(values):
         words, factor, error = explained
-        told = f"a factor {factor:.3g} (standard error {error:.1g}) in {words}"
-        reasons.append(with_factor(f"identified values are off as by {told}", factor))
+        why = f"a factor {factor:.3g} (standard error {error:.1g}) in {words}"
+        reasons.append(with_factor(f"identified values are off as by {why}", factor))
     feels = design.friction.load_coefficient > 0.0 and not loaded
     for one in values:
         kind = one.name.partition("_")[0]
@@ -244,15 +244,15 @@ def size_item(design: Design, values: Sequence[DesignValue], *, kept_constants: 
         if one.agrees:
             continue
         if kind == "back" and kept_constants:
-            told_how = "so kM and all torques are as far off: --electrical takes it from the record"
-            reasons.append(f"{off}, {told_how}")
+            with_it = "so kM and all torques are as far off: --electrical takes it from the record"
+            reasons.append(f"{off}, {with_it}")
         elif not 1.0 / most <= one.ratio <= most:
             known = {design.total_ratio: f"the reduction {design.total_ratio:g}"}
             reasons.append(with_factor(off, one.ratio, known))
         elif kind == "dry" and one.ratio > (MOST_DRY_UNLOADED if feels else LARGEST_FACTOR):
             load = (one.found - one.design) / max(design.friction.load_coefficient, 1e-300)
-            told = f": as under a load of {load:.3g} {design.load_unit}, not recorded"
-            reasons.append(off + told * feels)
+            why = f": as under a load of {load:.3g} {design.load_unit}, not recorded"
+            reasons.append(off + why * feels)
     label, passed = "Identified values are of the design's size", not reasons if values else None
     return Item(id="size", label=label, passed=passed, reason=next(iter(reasons), ""))
 
@@ -269,15 +269,15 @@ def offset_items(design: Design, fit: Fit) -> Iterator[Item]:
         return
     unit, stated = parameter("offset", design.axis).unit, key in design.parameters
     beside = f"beside the design's {own:.3g} {unit}" if stated else "that the design does not state"
-    told = f"{more:+.3g} {unit} {beside}: a load not recorded, or an offset of the current"
+    why = f"{more:+.3g} {unit} {beside}: a load not recorded, or an offset of the current"
     label = "Constant torque is the design's" if design.axis == "rotary" else "Constant force is the design's"
-    yield Item.unproven("offset", label, told)
+    yield Item.unproven("offset", label, why)
 
 
 def following_item(record: str, followed: Followed) -> Item:
     """Whether the record follows its command as the design's loops do at this motion."""
     label = f"{record}: the command is followed as by the design's loops"
     id = f"following-{record}"
-    if followed.zero or followed.alike < ALIKE:
+    if followed.zero or followed.cosine < PROPORTIONAL:
         return Item.of(id, label, followed.words)
     return share_item(id, label, max(abs(followed.clock), abs(followed.off)), RATE_TOLERANCE, followed.words)

@@ -70,7 +70,7 @@ class LimitCycles:
 
 
 def limit_cycles(design: AnyDesign) -> LimitCycles:
-    """Limit cycles of play and of quantisation, and what steps of the drive as it is end in.
+    """Limit cycles of play and of quantisation, and what its step responses end in.
 
     Cycles of play are predicted without dry friction and with it; those of dry friction alone are
     `analyses.friction_effects`.

@@ -11,6 +11,7 @@ v, and ``l z`` says how far. What else moves has died out by the next breakaway.
 
 import math
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -55,9 +56,14 @@ class _Slip:
     counts: Floats  # what l z is when the next period begins, of the states at each tick of one that rests
     pace: float  # growth of l z over a period at a motor angle of 1
 
+    @cached_property
+    def speeds(self) -> Floats:
+        """Those of both parts."""
+        return np.ascontiguousarray(self.runs[:, :, self.states.index("w")])
+
     def from_error(self, error: float) -> tuple[float, float] | None:
         """Error after the slip in its direction, time until the next slip; None: it does not end."""
-        w = np.array([1.0, error]) @ self.runs[:, :, self.states.index("w")]
+        w = np.array([1.0, error]) @ self.speeds
         ends = np.flatnonzero((w[1:-1] > 0.0) & (w[2:] <= 0.0)) + 1
         if not ends.size:
             return None
@@ -166,10 +172,21 @@ def _stands(design: Design, held: TickSystem, torque_Nm: float) -> tuple[Floats,
 
 
 def _runs(system: TickSystem, x: Floats, torques_Nm: Floats, count: int) -> Floats:
-    """The states from each row of x on, at so many ticks under a constant torque each at the motor."""
-    phases, runs = [system.matrices(j) for j in range(system.ticks)], np.empty((count, *x.shape))
-    ticks = [(A.T, np.outer(torques_Nm, B[:, 1])) for A, B, _, _ in phases]
-    for k in range(count):
-        A, driven = ticks[k % system.ticks]
-        runs[k], x = x, x @ A + driven
-    return runs.swapaxes(0, 1)
+    """The states from each row of x on, at so many ticks, whole periods, under a constant torque each.
+
+    What follows so many periods already known is one affine map of them; then tick by tick, of all at once.
+    """
+    phases = [system.matrices(j) for j in range(system.ticks)]
+    steps = [(A.T, np.outer(torques_Nm, B[:, 1])) for A, B, _, _ in phases]
+    A, driven = np.eye(x.shape[1]), np.zeros(x.shape)
+    for step, torque in steps:
+        A, driven = A @ step, driven @ step + torque
+    runs, known = np.empty((count // system.ticks, system.ticks, *x.shape)), 1
+    runs[:1, 0] = x
+    while known < len(runs):
+        more = min(known, len(runs) - known)
+        runs[known : known + more, 0] = runs[:more, 0] @ A + driven
+        A, driven, known = A @ A, driven @ A + driven, known + more
+    for j, (step, torque) in enumerate(steps[:-1], 1):
+        runs[:, j] = runs[:, j - 1] @ step + torque
+    return runs.reshape(-1, *x.shape).swapaxes(0, 1)

@@ -106,8 +106,8 @@ def import_campaign(campaign: Campaign, *, progress: Progress = None) -> Importe
             drive, sensor = read_record(entry.drive, campaign.drive), None
             if entry.sensor is not None:
                 if campaign.sensor is None:
-                    told = f"run {entry.id} has a sensor file, but there is no [sensor]"
-                    raise InputError(told, where=campaign.origin)
+                    why = f"run {entry.id} has a sensor file, but there is no [sensor]"
+                    raise InputError(why, where=campaign.origin)
                 sensor = read_record(entry.sensor, campaign.sensor)
             runs.append(assemble_run(campaign, entry, drive, sensor))
         except InputError as error:
@@ -115,8 +115,8 @@ def import_campaign(campaign: Campaign, *, progress: Progress = None) -> Importe
         if progress is not None:
             progress(k, len(campaign.runs))
     if not runs:
-        told = f"none of the {len(aside)} runs can be used; the first: {aside[0].reason}"
-        raise InputError(told, where=campaign.origin)
+        why = f"none of the {len(aside)} runs can be used; the first: {aside[0].reason}"
+        raise InputError(why, where=campaign.origin)
     return ImportedCampaign(campaign=campaign, runs=tuple(runs), set_aside=tuple(aside))
 
 

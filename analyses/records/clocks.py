@@ -134,18 +134,18 @@ def _check_durations(a: Series, b: Series, names: tuple[str, str], where: str) -
     steps = np.array([np.median(np.diff(one.time_s)) for one in (a, b)])
     if not np.all(spans) or abs(first / second - 1.0) <= RATE_SPREAD + 3.0 * np.max(steps / spans):
         return
-    told = f"the {names[1]} came or went at another time than the {names[0]}, a clock is off, or the records "
-    told += 'are of two runs; allowed: join.method = "given" with run.offset'
+    why = f"the {names[1]} came or went at another time than the {names[0]}, a clock is off, or the records "
+    why += 'are of two runs; allowed: join.method = "given" with run.offset'
     lasts = f"the {names[0]} lasts {first:.4g} s, the {names[1]} in the other record {second:.4g} s"
-    told = f"factor {factor}" if (factor := named_factor(first / second)) else told
-    raise Mismatch(f"{lasts}, {first / second:.4f} times as long: {told}", where=where)
+    why = f"factor {factor}" if (factor := named_factor(first / second)) else why
+    raise Mismatch(f"{lasts}, {first / second:.4f} times as long: {why}", where=where)
 
 
 def _by_event(a: Series, b: Series, where: str) -> ClockJoin:
     first, second = motion_events(*a), motion_events(*b)
     if first is None or second is None:
-        told = "no event: neither signal may be flat, and each must start below half of its plateau"
-        raise InputError(told, where=where)
+        why = "no event: neither signal may be flat, and each must start below half of its plateau"
+        raise InputError(why, where=where)
     (start_a, span_a), (start_b, span_b) = first, second
     step = np.hypot(np.median(np.diff(a.time_s)), np.median(np.diff(b.time_s))) / np.sqrt(12.0)
     rate, rate_std = 1.0, None
@@ -177,8 +177,8 @@ def _by_correlation(a: Series, b: Series, where: str) -> ClockJoin:
         p, covariance = _gauss_newton(pair, 1)
     rate, quality = pair.rate(p), pair.quality(p)
     if not quality >= MIN_QUALITY:
-        told = f"the two records are not alike: correlation {quality:.2f}, {MIN_QUALITY} wanted"
-        raise Mismatch(told, where=where)
+        why = f"the two records are not alike: correlation {quality:.2f}, {MIN_QUALITY} wanted"
+        raise Mismatch(why, where=where)
     return ClockJoin(
         offset_s=float(pair.start + p[0] * step + pair.middle - rate * pair.middle),
         offset_std_s=float(np.sqrt(covariance[0, 0]) * step),

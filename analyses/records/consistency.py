@@ -16,7 +16,13 @@ from actuator_lti.types import Floats, Mask
 from analyses.estimation.least_squares import solve
 from analyses.estimation.parameters import own_share
 from analyses.records.differentiation import butterworth
-from analyses.records.driven_motion import ALIKE, ratio_of, turned_current, wrong_time, wrong_time_of_speed
+from analyses.records.driven_motion import (
+    PROPORTIONAL,
+    ratio_of,
+    turned_current,
+    wrong_time,
+    wrong_time_of_speed,
+)
 from analyses.records.factors import explaining, named_factor, with_factor
 from analyses.records.naming import LOADS, RATES
 from analyses.records.record import DISORDER, HELD, Record, stretches
@@ -87,8 +93,8 @@ def because(findings: Mapping[str, Sequence[Finding]]) -> Iterator[None]:
     try:
         yield
     except InputError as error:
-        told = "; ".join(f"{name}: {why}" for name, one in findings.items() if (why := wrong_of(one)))
-        raise InputError(f"{told}; so {error}") if told else error from None
+        said = "; ".join(f"{name}: {why}" for name, one in findings.items() if (why := wrong_of(one)))
+        raise InputError(f"{said}; so {error}") if said else error from None
 
 
 def check_record(design: Design, record: Record) -> tuple[Finding, ...]:
@@ -142,7 +148,7 @@ class RateRatio:
 
     place: str  # the position's signal
     found: float  # the ratio
-    alike: float  # the cosine
+    cosine: float  # the cosine
     low: float  # Frisch's bounds: each regressed on the other, with the error of each
     high: float
     rate: Floats
@@ -168,15 +174,15 @@ def rate_ratio(design: Design, record: Record) -> RateRatio | None:
     speed = 0.5 * (first + last)
     # in a long rest there is nothing but noise
     moves = np.any([np.abs(one) > IN_MOTION * np.max(np.abs(one)) for one in (rate, speed)], axis=0)
-    found, alike = ratio_of(speed[moves], rate[moves])
+    found, cosine = ratio_of(speed[moves], rate[moves])
     low, high = -inf, inf
     x, y = (_thinned(record, values) for values in (rate, speed))
-    if abs(alike) >= ALIKE and found > 0.0 and len(x) >= LEAST_ROWS:
+    if abs(cosine) >= PROPORTIONAL and found > 0.0 and len(x) >= LEAST_ROWS:
         bent = np.gradient(np.gradient(rate)) / 12.0  # what a straight line between two samples leaves out
         between = sum(abs(ratio_of(off[moves], rate[moves])[0]) for off in (0.5 * (last - first), bent))
         low, high = _bounds(y, x, np.gradient(x), np.gradient(y))
         low, high = low - between, high + between
-    return RateRatio(place[0], found, alike, low, high, rate, moves)
+    return RateRatio(place[0], found, cosine, low, high, rate, moves)
 
 
 def _thinned(record: Record, values: Floats) -> Floats:
@@ -209,14 +215,14 @@ def _rate(ratio: RateRatio | None, design: Design, record: Record) -> Finding | 
     if ratio is None:
         return None
     subject, off = f"{name} against the rate of the {ratio.place}", ratio.found - 1.0
-    if abs(ratio.alike) < ALIKE:
-        told = f"they are not alike (cosine {ratio.alike:.2f})"
+    if abs(ratio.cosine) < PROPORTIONAL:
+        why = f"they are not alike (cosine {ratio.cosine:.2f})"
         rest = [other for other in record.signals if other not in (name, "angle", "output_angle", "position")]
         likes = {other: _smooth(record, record[other][1:])[ratio.moves] for other in rest}
         swapped = (n for n, one in likes.items() if abs(ratio_of(one, ratio.rate[ratio.moves])[1]) > 0.97)
         if other := next(swapped, ""):
-            told += f"; {other} is: are the columns of {name} and {other} swapped?"
-        return Finding(subject, False, told)
+            why += f"; {other} is: are the columns of {name} and {other} swapped?"
+        return Finding(subject, False, why)
     said = f"the {name} is {ratio.found:.4g} times the rate of the {ratio.place}"
     if not ratio.doubt and abs(off) <= 0.5:
         return Finding(subject, True, f"{said}: one clock, one scale")
@@ -264,10 +270,10 @@ def _ticks_a_row(design: Design, record: Record) -> tuple[float, bool]:
 def _time(design: Design, record: Record) -> Finding | None:
     """A unit of the time that the lag behind the command tells, or what a current accelerates."""
     place = place_of(design, record)
-    if place is not None and (told := wrong_time(design, record, place[1])):
-        return Finding("time against the lag behind the command", False, told)
-    told = wrong_time_of_speed(design, record)
-    return Finding("time against the current", False, told) if told else None
+    if place is not None and (why := wrong_time(design, record, place[1])):
+        return Finding("time against the lag behind the command", False, why)
+    why = wrong_time_of_speed(design, record)
+    return Finding("time against the current", False, why) if why else None
 
 
 def _sign(design: Design, record: Record) -> Finding | None:
@@ -276,8 +282,8 @@ def _sign(design: Design, record: Record) -> Finding | None:
     speed = rate if place is None else np.gradient(place[1], record.time_s)
     if speed is None or "current" not in record.signals or "voltage" in record.signals:
         return None
-    told = turned_current(design, record, *(_smooth(record, one) for one in (record["current"], speed)))
-    return Finding("current against the motion", False, told) if told else None
+    why = turned_current(design, record, *(_smooth(record, one) for one in (record["current"], speed)))
+    return Finding("current against the motion", False, why) if why else None
 
 
 def _clock(design: Design, record: Record) -> Finding | None:
@@ -289,8 +295,8 @@ def _clock(design: Design, record: Record) -> Finding | None:
         return None
     subject = "sampling period against the drive's tick"
     if whole:
-        told = f"{round(ticks)} tick(s); a clock that is off by a whole number of them is not seen here"
-        return Finding(subject, True, told)
+        why = f"{round(ticks)} tick(s); a clock that is off by a whole number of them is not seen here"
+        return Finding(subject, True, why)
     text = f"{ticks:.5g} ticks: another recorder's clock, or one that is off"
     return Finding(subject, None, text + ": the intervals hold it" * bool(clock_doubt(design, record)))
 
@@ -300,9 +306,9 @@ def _rows(record: Record) -> Finding | None:
     lost, rows = record.counts.dropped.get(DISORDER, 0), record.counts.rows_in
     if lost <= FEW_ROWS * rows:
         return None
-    told = f"{lost} of {rows} rows are left out, as their time does not increase"
-    told += f" ({record.counts.first_dropped[DISORDER]}): another run? It needs a file of its own"
-    return Finding(ROWS, None, told, unproven=True)
+    why = f"{lost} of {rows} rows are left out, as their time does not increase"
+    why += f" ({record.counts.first_dropped[DISORDER]}): another run? It needs a file of its own"
+    return Finding(ROWS, None, why, unproven=True)
 
 
 def _jumps(design: Design, record: Record) -> Finding | None:
@@ -316,13 +322,13 @@ def _jumps(design: Design, record: Record) -> Finding | None:
     unit = "m" if design.axis == "linear" else "rad"
     jumps, few = named_rows(record, rows, place[0], unit, jumps=True), len(rows) <= FEW_ROWS * len(record)
     most = f"more than the speed limit, {reachable_speed(design):.4g} {unit}/s at the motor, allows"
-    told = BAD_ROW if few else "is the unit of the position or of the time right?"
+    why = BAD_ROW if few else "is the unit of the position or of the time right?"
     turn = 2.0 * np.pi * (design.total_ratio if place[0] == "output_angle" else 1.0)
     off = np.abs(np.abs(np.diff(place[1])) - turn)[rows - 1]
     if design.axis == "rotary" and np.all(off <= rate * np.diff(record.time_s)[rows - 1]):
-        told = "it begins anew with each turn: count the turns on (numpy.unwrap)"
-    told = f"the {place[0]} jumps {jumps}: {most} in that time: {told}"
-    return Finding(f"steps of the {place[0]} from row to row", False, told)
+        why = "it begins anew with each turn: count the turns on (numpy.unwrap)"
+    why = f"the {place[0]} jumps {jumps}: {most} in that time: {why}"
+    return Finding(f"steps of the {place[0]} from row to row", False, why)
 
 
 def _steps(design: Design, record: Record) -> Finding | None:
@@ -345,11 +351,11 @@ def _steps(design: Design, record: Record) -> Finding | None:
     def times_its_neighbours(at: int, beside: list[int]) -> tuple[Floats, int]:
         """A step of each row over those beside it, 0 where these are not alike; how many are."""
         mean, size = rows[:, beside].mean(axis=1), np.abs(rows[:, beside].mean(axis=1))
-        alike = np.all(np.abs(rows[:, beside] - mean[:, None]) < STEADY * size[:, None], axis=1)
+        cosine = np.all(np.abs(rows[:, beside] - mean[:, None]) < STEADY * size[:, None], axis=1)
         noise = NORMAL * float(np.median(np.abs(rows[:, at] - mean)))  # of a normal deviation
-        alike &= (STEADY * size > count[at : at + len(rows)]) & (0.5 * size > SURE * noise)
-        share = np.divide(rows[:, at], mean, out=np.zeros(len(mean)), where=alike)
-        return share, int(np.count_nonzero(alike))
+        cosine &= (STEADY * size > count[at : at + len(rows)]) & (0.5 * size > SURE * noise)
+        share = np.divide(rows[:, at], mean, out=np.zeros(len(mean)), where=cosine)
+        return share, int(np.count_nonzero(cosine))
 
     missing, places = times_its_neighbours(2, [0, 1, 3, 4])
     filled, _ = times_its_neighbours(3, [0, 1, 4, 5])
@@ -357,11 +363,11 @@ def _steps(design: Design, record: Record) -> Finding | None:
     copied = int(np.count_nonzero((rows[:, 2] == 0.0) & (filled > 1.5)))
     if not places:
         return None
-    told = [f"{lost:.0f} rows are missing where the time goes on, or time stamps jitter"] if lost else []
-    told += [f"{copied} rows repeat the one before"] if copied else []
-    words = f"{' and '.join(told) or 'none is of two rows'}, of {places} places where the motion tells"
-    words += ": take the record again, or give the times at which rows were taken" if told else ""
-    return Finding(f"steps of the {place[0]} from row to row", not told, words)
+    kinds = [f"{lost:.0f} rows are missing where the time goes on, or time stamps jitter"] if lost else []
+    kinds += [f"{copied} rows repeat the one before"] if copied else []
+    words = f"{' and '.join(kinds) or 'none is of two rows'}, of {places} places where the motion tells"
+    words += ": take the record again, or give the times at which rows were taken" if kinds else ""
+    return Finding(f"steps of the {place[0]} from row to row", not kinds, words)
 
 
 def _reduction(design: Design, record: Record) -> Finding | None:
@@ -370,9 +376,9 @@ def _reduction(design: Design, record: Record) -> Finding | None:
     if not any(np.ptp(record[name]) > 0.0 for name in ("angle", "output_angle")):
         return None
     a, b = (record[name] - record[name].mean() for name in ("angle", "output_angle"))
-    ratio, alike = ratio_of(a, design.total_ratio * b)
+    ratio, cosine = ratio_of(a, design.total_ratio * b)
     subject = "angle against output angle"
-    if abs(alike) < ALIKE:
+    if abs(cosine) < PROPORTIONAL:
         return Finding(subject, False, "they are not alike")
     passed = abs(ratio - 1.0) <= RATE_TOLERANCE + _twist_share(design, record)
     text = f"the motor angle is {ratio:.4g} times the output angle and the reduction"
@@ -412,8 +418,8 @@ def _frozen(design: Design, record: Record) -> Finding | None:
     held = np.ptp(at) > 0.0 and at[start] in (at.min(), at.max())
     if chance >= NO_CHANCE or at[start] == 0.0 or held or not _turns_back(design, record, start, stop + 1):
         return None
-    told = f"the current is {at[start]:.4g} A in {length + 1} rows, from {place_in_file(record, start)} on"
-    return Finding("current from row to row", False, f"{told}, while the motion turns back: frozen?")
+    why = f"the current is {at[start]:.4g} A in {length + 1} rows, from {place_in_file(record, start)} on"
+    return Finding("current from row to row", False, f"{why}, while the motion turns back: frozen?")
 
 
 def _turns_back(design: Design, record: Record, start: int, stop: int) -> bool:
@@ -475,9 +481,9 @@ def _electrical(doubt: float, design: Design, record: Record) -> Finding | None:
 
     ``doubt`` is the share by which the clock may be off.
     """
-    if not (told := _voltage_told(design, record, doubt)):
+    if not (finding := _voltage_finding(design, record, doubt)):
         return None
-    (passed, words), u, i = told, record["voltage"], record["current"]
+    (passed, words), u, i = finding, record["voltage"], record["current"]
     for cause, changed in (
         ("the sign of the current is reversed", {"current": -i}),
         ("the sign of the voltage is reversed", {"voltage": -u}),
@@ -485,7 +491,11 @@ def _electrical(doubt: float, design: Design, record: Record) -> Finding | None:
         ("the columns of current and voltage are swapped", {"voltage": i, "current": u}),
     ):
         other = replace(record, signals={**record.signals, **changed})
-        if passed is False and (instead := _voltage_told(design, other, doubt)) and instead[0] is not False:
+        if (
+            passed is False
+            and (instead := _voltage_finding(design, other, doubt))
+            and instead[0] is not False
+        ):
             return Finding("voltage against R i + kE w", False, f"{words}: {cause}")
     if passed is None and (stands := _standing_current(design, record)):
         passed, words = False, stands
@@ -494,13 +504,13 @@ def _electrical(doubt: float, design: Design, record: Record) -> Finding | None:
     return Finding("voltage against R i + kE w", passed, words)
 
 
-def _voltage_told(design: Design, record: Record, doubt: float) -> tuple[bool | None, str] | None:
+def _voltage_finding(design: Design, record: Record, doubt: float) -> tuple[bool | None, str] | None:
     """Whether each part of the voltage counts once, and in words; None where nothing tells."""
     parts = _electrical_parts(design, record).items()
-    told = [_counted(design, name, *ends, doubt if name == "kE w" else 0.0) for name, ends in parts]
-    each = [one for one, _ in told]
+    findings = [_counted(design, name, *ends, doubt if name == "kE w" else 0.0) for name, ends in parts]
+    each = [one for one, _ in findings]
     passed = False if False in each else None if None in each else True
-    return (passed, "; ".join(words for _, words in told)) if told else None
+    return (passed, "; ".join(words for _, words in findings)) if findings else None
 
 
 def one_phase(design: Design, record: Record) -> bool:
@@ -523,8 +533,8 @@ def _standing_current(design: Design, record: Record) -> str:
         return ""
     u, w = (_smooth(record, values - values.mean()) for values in (record["voltage"], speed))
     moves = float(np.std(u - ratio_of(u, w)[0] * w)) / design.motor.resistance_ohm
-    told = f"the current is {at[0]:.4g} A throughout, the voltage says that it moves by {moves:.2g} A rms"
-    return told if moves > 0.5 * abs(at[0]) else ""
+    why = f"the current is {at[0]:.4g} A throughout, the voltage says that it moves by {moves:.2g} A rms"
+    return why if moves > 0.5 * abs(at[0]) else ""
 
 
 def resistance_doubt(design: Design, record: Record) -> float:
@@ -571,12 +581,12 @@ def _load(design: Design, record: Record) -> Finding | None:
         return None
     load, torque = (_smooth(record, values) for values in (record[name], constant * record["current"]))
     for ratio in {1.0, design.total_ratio}:
-        share, alike = ratio_of(load, ratio * torque)
-        if alike > ALIKE and abs(share - 1.0) <= SURE * own_share(design, "motor.torque_constant"):
+        share, cosine = ratio_of(load, ratio * torque)
+        if cosine > PROPORTIONAL and abs(share - 1.0) <= SURE * own_share(design, "motor.torque_constant"):
             words = "kM i" if ratio == 1.0 else "kM i and the reduction"
-            told = f"the {name} is {share:.4g} times {words}: the drive's own (leave the column out), "
-            told += "or a load of turned sign: positive drives forward"
-            return Finding("load against the current", False, told)
+            why = f"the {name} is {share:.4g} times {words}: the drive's own (leave the column out), "
+            why += "or a load of turned sign: positive drives forward"
+            return Finding("load against the current", False, why)
     return None
 
 
@@ -591,10 +601,10 @@ def _command(design: Design, record: Record) -> Finding | None:
             continue
         output = (command, answer) in (("reference", "angle"), ("output_speed_reference", "speed"))
         values = record[answer] / (design.total_ratio if output else 1.0)
-        ratio, alike = ratio_of(*(part - part.mean() for part in (values, record[command])))
+        ratio, cosine = ratio_of(*(part - part.mean() for part in (values, record[command])))
         subject = f"{answer} against its command"
-        if abs(alike) < 0.7:
-            return Finding(subject, None, f"cosine {alike:.2f}: not followed")
+        if abs(cosine) < 0.7:
+            return Finding(subject, None, f"cosine {cosine:.2f}: not followed")
         factor = named_factor(ratio, {design.total_ratio: f"the reduction {design.total_ratio:g}"})
         followed = 0.5 < ratio < 1.5
         wrong = factor is not None and not followed

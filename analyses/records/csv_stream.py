@@ -114,8 +114,8 @@ class _File:
                 try:
                     cells = next(csv.reader([text_of(head, layout.encoding)], delimiter=_separator(layout)))
                 except (LookupError, csv.Error, StopIteration) as error:
-                    told = f"the line of column names cannot be read: {error}"
-                    raise InputError(told, where=f"{self.origin}:{line}") from None
+                    why = f"the line of column names cannot be read: {error}"
+                    raise InputError(why, where=f"{self.origin}:{line}") from None
                 return tuple(cell.strip() for cell in cells), rest, line + 1
             text, line = rest, line + 1
         return (), b"", line

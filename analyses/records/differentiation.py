@@ -69,15 +69,15 @@ def low_pass(values: Floats, period_s: float, *, cutoff_hz: float, order: int) -
     if not 0.0 < cutoff_hz < 0.5 / period_s:
         raise InputError(f"cutoff = {cutoff_hz:g} Hz: must be between 0 and {0.5 / period_s:g} Hz")
     if (2.0 * cutoff_hz * period_s) ** order < np.finfo(float).eps:
-        told = f"cutoff = {cutoff_hz:g} Hz: too low for rows that are {period_s:g} s apart"
-        raise InputError(f"{told}; allowed: fewer rows or a higher cut-off")
+        why = f"cutoff = {cutoff_hz:g} Hz: too low for rows that are {period_s:g} s apart"
+        raise InputError(f"{why}; allowed: fewer rows or a higher cut-off")
     if len(values) <= 3 * order:
         raise InputError(f"{len(values)} samples: more than {3 * order} are needed; allowed: a longer record")
     padding = round(3 * order * max(1.0, 0.1 / (cutoff_hz * period_s)))
     if len(values) <= padding:
-        told = f"its filter remembers {padding} rows, and there are {len(values)}; allowed:"
+        why = f"its filter remembers {padding} rows, and there are {len(values)}; allowed:"
         lowest = f"{lowest_cutoff_hz(len(values), period_s, order):.6g} Hz and more, or more rows"
-        raise InputError(f"cutoff = {cutoff_hz:g} Hz: {told} {lowest}")
+        raise InputError(f"cutoff = {cutoff_hz:g} Hz: {why} {lowest}")
     b, a = butterworth(order, 2.0 * cutoff_hz * period_s)
     return np.asarray(filtfilt(b, a, values, padlen=padding), dtype=np.float64)
 

@@ -10,7 +10,7 @@ from analyses.records.factors import NEAR, named_factor
 from analyses.records.naming import LOADS, RATES
 from analyses.records.record import Record
 
-ALIKE = 0.9  # cosine above which one signal is taken to be a multiple of the other
+PROPORTIONAL = 0.9  # cosine above which one signal is taken to be a multiple of the other
 TIMES = (60.0, 1e3, 1e6)  # min, ms and us read as s
 
 
@@ -35,13 +35,13 @@ def wrong_time(design: Design, record: Record, place: Floats) -> str:
     if loop.integral_time_s is not None or any(getattr(loop, name) for name in FEED_FORWARD):
         return ""
     error = design.total_ratio * record[command] - place
-    lag, alike = ratio_of(error - error.mean(), np.gradient(place, record.time_s))
+    lag, cosine = ratio_of(error - error.mean(), np.gradient(place, record.time_s))
     ratio = lag * loop.gain
     size = max(ratio, 1.0 / ratio) if ratio > 0.0 else 1.0
-    if alike < ALIKE or not any(abs(size / factor - 1.0) < NEAR for factor in TIMES):
+    if cosine < PROPORTIONAL or not any(abs(size / factor - 1.0) < NEAR for factor in TIMES):
         return ""
-    told = f"the motion lags its command by {lag:.3g} s, {ratio:.4g} times what the loop's gain makes"
-    return f"{told}: factor {named_factor(ratio)}, in the unit of the time"
+    why = f"the motion lags its command by {lag:.3g} s, {ratio:.4g} times what the loop's gain makes"
+    return f"{why}: factor {named_factor(ratio)}, in the unit of the time"
 
 
 def wrong_time_of_speed(design: Design, record: Record) -> str:
@@ -61,13 +61,13 @@ def wrong_time_of_speed(design: Design, record: Record) -> str:
     parts = np.column_stack([own, resisting])
     inertia, friction = shares = scaled_lstsq(parts, torque)
     inverse = scaled_lstsq(np.column_stack([torque, resisting]), own)[0]
-    _, alike = ratio_of(torque, parts @ shares)
+    _, cosine = ratio_of(torque, parts @ shares)
     units = (factor**side for factor in TIMES[1:] for side in (1, -1))
     factor = next((one for one in units if 0.5 < inertia / one < 2.0 and 0.5 < one * inverse < 2.0), None)
-    if alike < ALIKE or not 0.5 < friction < 2.0 or factor is None:
+    if cosine < PROPORTIONAL or not 0.5 < friction < 2.0 or factor is None:
         return ""
-    told = f"by the current the inertia is {inertia:.4g} times the design's, the friction {friction:.4g}"
-    return f"{told} times: factor {named_factor(factor)}, in the unit of the time"
+    why = f"by the current the inertia is {inertia:.4g} times the design's, the friction {friction:.4g}"
+    return f"{why} times: factor {named_factor(factor)}, in the unit of the time"
 
 
 def _is_loaded(design: Design, record: Record) -> bool:
@@ -89,8 +89,8 @@ def turned_current(design: Design, record: Record, current: Floats, speed: Float
     if _is_loaded(design, record) or record.signals.keys() & {"force", "force_reference", "torque_reference"}:
         return ""
     torque = np.add(*_own_torques(design, speed, record))
-    _, alike = ratio_of(current - current.mean(), torque - torque.mean())
-    if alike > -ALIKE:
+    _, cosine = ratio_of(current - current.mean(), torque - torque.mean())
+    if cosine > -PROPORTIONAL:
         return ""
-    told = "the sign of the current is turned, or that of the motion: the current drives against the torque"
-    return f"{told} that the design needs for it (cosine {alike:.2f})"
+    why = "the sign of the current is turned, or that of the motion: the current drives against the torque"
+    return f"{why} that the design needs for it (cosine {cosine:.2f})"

@@ -53,13 +53,13 @@ def _use(record: Record, one: InputColumn, used: Mapping[str, str]) -> InputUse:
     return InputUse(column=one.column, meaning=meaning, unit=unit, low=low, high=high, si=si, use=use + note)
 
 
-def lacking(record: Record, told: str) -> InputError:
+def lacking(record: Record, why: str) -> InputError:
     """What a record lacks, and which columns of its file were not read, and why."""
     left = "; ".join(f"{shown(one.column)}: {one.note}" for one in record.inputs if not one.signal)
-    told += f"; of its columns were not read, unless a record file (TOML) says what they are: {left}" * bool(
+    why += f"; of its columns were not read, unless a record file (TOML) says what they are: {left}" * bool(
         left
     )
-    return InputError(told, where=record.name)
+    return InputError(why, where=record.name)
 
 
 def inputs_of(spec: RecordSpec, columns: Sequence[str]) -> tuple[InputColumn, ...]:

@@ -77,13 +77,13 @@ def _against_the_best(current: Floats, load: Floats) -> tuple[Floats, float]:
     power = squares[n:] - squares[:-n] - drift @ placed[:-1] ** 2
     beside = np.maximum(placed[-1] - (drift * own) @ placed[:-1], 0.0)
     seen = power > ROUNDING * squares[-1]
-    told = np.divide(beside, power, out=np.zeros_like(power), where=seen)
+    slope = np.divide(beside, power, out=np.zeros_like(power), where=seen)
     alone = total - drift @ own**2
-    left, worth = np.maximum(alone[:, None] - told * beside, ROUNDING * total), float(n)
+    left, worth = np.maximum(alone[:, None] - slope * beside, ROUNDING * total), float(n)
     for _ in range(2):
         minus = minus_likelihood(left, drift, worth)
         cut, best = np.unravel_index(np.argmin(minus), minus.shape)
-        rest = current - told[cut, best] * load[best : best + n]
+        rest = current - slope[cut, best] * load[best : best + n]
         worth = n / correlation_time(rest - (drift[cut] * (waves @ rest)) @ waves)
     ratio = np.min(minus, axis=0) - minus[cut, best]
     return ratio, float(np.sqrt(1.0 - left[cut, best] / alone[cut]))

@@ -104,13 +104,13 @@ def _described(path: Path) -> list[Record]:
         names: list[Any] = files if isinstance(files, list) and files else [files]
         if not all(isinstance(name, str) for name in names):
             raise own.fail("file", "a text, or a list of texts, is wanted")
-        told = tuple(f"set: {key} = {value}" for key, value in settings.items())
-        read = (_read_as_told(path.parent / name, own) for name in names)
-        result += [replace(one, settings=settings, notes=(*one.notes, *told)) for one in read]
+        settings_notes = tuple(f"set: {key} = {value}" for key, value in settings.items())
+        read = (_read_by_settings(path.parent / name, own) for name in names)
+        result += [replace(one, settings=settings, notes=(*one.notes, *settings_notes)) for one in read]
     return result
 
 
-def _read_as_told(path: Path, own: Table) -> Record:
+def _read_by_settings(path: Path, own: Table) -> Record:
     """A file as its table says; where that describes no column, the columns' own names do."""
     if own.data["signals"] or not set(own) <= {*BESIDE, *BY_ROW}:
         rest = {key: value for key, value in own.data.items() if key not in ("file", "settings")}
@@ -194,10 +194,10 @@ def _columns_of_csv(head: str) -> tuple[tuple[str, ...], CsvFormat]:
     else:
         units = ()
     stamps = [STAMP.fullmatch(cell.encode()) is not None for cell in rows[0][1]] if rows else []
-    told = [unit or ("s" if stamp else "") for unit, stamp in zip_longest(units, stamps, fillvalue="")]
-    names = tuple(f"{name} [{unit}]" if unit else name for name, unit in zip_longest(columns, told))
+    read_units = [unit or ("s" if stamp else "") for unit, stamp in zip_longest(units, stamps, fillvalue="")]
+    names = tuple(f"{name} [{unit}]" if unit else name for name, unit in zip_longest(columns, read_units))
     layout = CsvFormat(separator=separator, decimal="," if comma else ".", stamps=any(stamps))
-    if names == columns or len(told) != len(columns):
+    if names == columns or len(read_units) != len(columns):
         return columns, layout
     return names, replace(layout, names=names, skip_lines=at)
 

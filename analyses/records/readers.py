@@ -92,8 +92,8 @@ def columns_of(content: MatContent, layout: CsvFormat, path: Path) -> Mapping[st
         raise InputError(f'matrix = "{layout.matrix}": no such matrix; there are: {there}', where=str(path))
     names, count = layout.names or names_in(content, matrix.shape[1]), matrix.shape[1]
     if len(names) != count:
-        told = f"has {count} columns, {len(names)} names are given: names = [...] must name each"
-        raise InputError(f'matrix "{layout.matrix}" {told}', where=str(path))
+        why = f"has {count} columns, {len(names)} names are given: names = [...] must name each"
+        raise InputError(f'matrix "{layout.matrix}" {why}', where=str(path))
     return dict(zip(names, matrix.T, strict=True))
 
 

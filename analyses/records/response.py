@@ -224,8 +224,8 @@ def _response(columns: Mapping[str, Floats], name: str, averages: int | None) ->
     units = {role: column.unit_of(role, own, table[role]) for role, own in found.items()}
     f = table["frequency"] * column.si_of("frequency", units["frequency"])
     if f.size < 2 or not (f > 0.0).all():
-        told = f"{f.size} rows of numbers, frequencies above 0 in {(f > 0.0).sum()}"
-        raise InputError(f"{told}; allowed: two rows or more, each at a frequency above 0 Hz")
+        read_as = f"{f.size} rows of numbers, frequencies above 0 in {(f > 0.0).sum()}"
+        raise InputError(f"{read_as}; allowed: two rows or more, each at a frequency above 0 Hz")
     z, coherence = column.complex_values(table, units), table.get("coherence", np.full(f.size, np.nan))
     if (odd := coherence[(coherence < 0.0) | (coherence > 1.0)]).size:
         per_cent = ", a ratio and not per cent" * bool((coherence[coherence > 1.0] <= 100.0).any())
@@ -235,14 +235,14 @@ def _response(columns: Mapping[str, Floats], name: str, averages: int | None) ->
     beside = {own: columns[own] for own in columns if own not in found.values()}
     column.refuse_contradiction(beside, f, z, good)
     deviation, radius, noise = column.noise_of(table, units, averages)
-    left_out, told = count - int(good.sum()), column.taken_as(columns, found, units, known=bool(noise))
+    left_out, read_as = count - int(good.sum()), column.taken_as(columns, found, units, known=bool(noise))
     read = _averaged(RecordedResponse(f, z, deviation, coherence, name, left_out, radius, noise))
     if (few := read.frequency_hz).size < 2:
         raise InputError(f"every row is at {few[0]:.6g} Hz; allowed: two frequencies or more")
     if twice := f.size - few.size:
-        told += f"; rows that repeat a frequency are averaged ({twice})"
+        read_as += f"; rows that repeat a frequency are averaged ({twice})"
     period_s = float(table[column.PERIOD][0]) if column.PERIOD in table else None
-    return replace(read, read_as=told, period_s=period_s)
+    return replace(read, read_as=read_as, period_s=period_s)
 
 
 def _averaged(read: RecordedResponse) -> RecordedResponse:
@@ -263,8 +263,8 @@ def _averaged(read: RecordedResponse) -> RecordedResponse:
     if not z.all():
         raise InputError("repeats whose mean is 0; allowed: values that do not cancel")
     size, own = np.abs(z), np.abs(once.response)
-    told = (once.deviation, once.radius)
-    deviation, radius = (np.sqrt(mean((one * own) ** 2) / count) / size for one in told)
+    errors = (once.deviation, once.radius)
+    deviation, radius = (np.sqrt(mean((one * own) ** 2) / count) / size for one in errors)
     f, coherence = once.frequency_hz[first], mean(once.coherence)
     made = replace(once, frequency_hz=f, response=z, deviation=deviation, coherence=coherence, radius=radius)
     if np.isfinite(radius).all():

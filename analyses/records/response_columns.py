@@ -187,24 +187,24 @@ def noise_of(
     if (n < 2.0).any():
         raise InputError("averages: at least 2")
     deviation = np.sqrt((1.0 - coherence) / (coherence * (n - 1.0)))
-    told = f"coherence of {n.min():g} averages{' or more' if n.min() < n.max() else ''}"
-    return deviation, deviation * student(n - 1.0, CONFIDENCE), told if np.isfinite(n).all() else ""
+    why = f"coherence of {n.min():g} averages{' or more' if n.min() < n.max() else ''}"
+    return deviation, deviation * student(n - 1.0, CONFIDENCE), why if np.isfinite(n).all() else ""
 
 
 def _deviation(table: Mapping[str, Floats], units: Mapping[str, str]) -> Floats:
     """Root mean square of the complex error over the size, from that or from one or both of its parts."""
-    told = [(units[role], table[role]) for role in _DEVIATIONS if role in table]
-    if not all((values >= 0.0).all() for _, values in told):
+    given = [(units[role], table[role]) for role in _DEVIATIONS if role in table]
+    if not all((values >= 0.0).all() for _, values in given):
         raise InputError("a deviation below 0")
-    kinds = tuple(sorted(unit for unit, _ in told))
+    kinds = tuple(sorted(unit for unit, _ in given))
     if kinds in (("",), ("%",)):
-        return told[0][1] * si_of("", kinds[0])
+        return given[0][1] * si_of("", kinds[0])
     if kinds not in (("dB",), ("deg",), ("rad",), ("dB", "deg"), ("dB", "rad")):
         words = " and ".join(unit or "no unit" for unit in kinds)
         allowed = "one over the size of the value (a ratio or %), or of the gain in dB, of the phase in deg"
         raise InputError(f"deviations in {words}; allowed: {allowed}, or both")
     parts = [
-        np.expm1(values * _DB) if unit == "dB" else si_of("phase", unit) * values for unit, values in told
+        np.expm1(values * _DB) if unit == "dB" else si_of("phase", unit) * values for unit, values in given
     ]
     return np.sqrt(2.0 / len(parts) * np.sum(np.square(parts), axis=0))
 
@@ -212,15 +212,15 @@ def _deviation(table: Mapping[str, Floats], units: Mapping[str, str]) -> Floats:
 def taken_as(
     columns: Mapping[str, Floats], found: Mapping[str, str], units: Mapping[str, str], *, known: bool
 ) -> str:
-    told = []
+    sentences = []
     for role in sorted(found, key=lambda role: (*_ORDER, role).index(role)):
         unsaid = units[role] and not _said(role, found[role])
         unit = f" in {units[role]}{' (it says no unit)' if unsaid else ''}" if units[role] else ""
-        told.append(f"{_WORDS.get(role, role)} {shown(found[role])}{unit}")
+        sentences.append(f"{_WORDS.get(role, role)} {shown(found[role])}{unit}")
     left = [shown(name) for name in columns if name and name not in found.values()]
     more = f"; not read: {', '.join(left[:12])}" if left else ""
     if "coherence" in found and not known:
         more += "; the coherence tells no noise without averages (--averages N)"
     elif "coherence" in found and "deviation" in found:
         more += "; the noise is that of the deviation, not of the coherence"
-    return f"read as {', '.join(told)}{more}"
+    return f"read as {', '.join(sentences)}{more}"

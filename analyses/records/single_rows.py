@@ -54,12 +54,12 @@ def named_rows(record: Record, rows: Ints, name: str, unit: str, *, jumps: bool 
     """The first few such rows, with what the file has there in SI; with ``jumps`` the row before as well."""
     values = record[name]
 
-    def told(row: int) -> str:
+    def words(row: int) -> str:
         before = f"from {values[row - 1]:.4g} to " * jumps
         return f"{before}{values[row]:.4g} {unit} in {place_in_file(record, row)}"
 
     more = [f"{len(rows) - MOST_NAMED} more"] if len(rows) > MOST_NAMED else []
-    return " and ".join([", ".join(map(told, rows[:MOST_NAMED].tolist())), *more])
+    return " and ".join([", ".join(map(words, rows[:MOST_NAMED].tolist())), *more])
 
 
 def place_in_file(record: Record, row: int) -> str:

@@ -47,7 +47,7 @@ class CsvFormat:
         except LookupError:
             ascii_like = False
         odd = mark != "whitespace" and (len(mark) != 1 or mark in "\r\n\"'")
-        for wrong, told in (
+        for wrong, why in (
             (odd, f'separator = "{mark}": one character, or "whitespace"'),
             (self.decimal not in (".", ","), f'decimal = "{self.decimal}": "." or ","'),
             (mark == self.decimal, f'separator and decimal are both "{mark}": they must differ'),
@@ -56,7 +56,7 @@ class CsvFormat:
             (self.header is False and not self.names, "header = false: then names are needed"),
         ):
             if wrong:
-                raise InputError(told)
+                raise InputError(why)
 
     @property
     def has_header(self) -> bool:

@@ -64,8 +64,8 @@ def find_steady_window(
     start, stop = start + half + trim, stop + half - trim
     if stop - start < max(criterion.least_duration_s / period, 8.0):
         calmest = float(np.min(np.abs(slope[moving]), initial=np.inf))
-        told = f"the smallest acceleration is {calmest:.3g} rad/s2, the limit {limit:.3g} rad/s2"
-        raise InputError(f"no steady part of {criterion.least_duration_s:g} s: {told}")
+        why = f"the smallest acceleration is {calmest:.3g} rad/s2, the limit {limit:.3g} rad/s2"
+        raise InputError(f"no steady part of {criterion.least_duration_s:g} s: {why}")
     largest = float(np.max(np.abs(slope[start - half : stop - half])))
     return SteadyWindow(start, stop, float(time_s[start]), float(time_s[stop - 1]), float(limit), largest)
 

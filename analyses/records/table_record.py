@@ -117,12 +117,12 @@ class SiRows:
         keep = np.asarray(time > reached[:-1])
         if not keep.all() and self._spec.disorder == "error":
             k = int(keep.argmin())
-            told = f"time {time[k]:.15g} s does not come after {reached[k]:.15g} s"
+            why = f"time {time[k]:.15g} s does not come after {reached[k]:.15g} s"
             if time[k] == reached[k]:
-                told += ": a row twice, or stamps of too few digits (then give time.period, not a column)"
-            told += '; allowed: rising times: a file for each run; or disorder = "drop" in a record file, '
-            told += "which leaves out this row and all that follow up to the time that was reached"
-            raise InputError(told, where=f"{self._origin}:{block.lines[k]}")
+                why += ": a row twice, or stamps of too few digits (then give time.period, not a column)"
+            why += '; allowed: rising times: a file for each run; or disorder = "drop" in a record file, '
+            why += "which leaves out this row and all that follow up to the time that was reached"
+            raise InputError(why, where=f"{self._origin}:{block.lines[k]}")
         return keep
 
 
@@ -139,8 +139,8 @@ def record_of_columns(vectors: Mapping[str, Floats], spec: RecordSpec, path: Pat
         if infinite.any():
             raise InputError(f'"{name}": not finite', where=f"{path}, row:{infinite.argmax() + 1}")
     if len(set(map(len, columns))) > 1:
-        told = ", ".join(f"{name} {len(column)}" for name, column in zip(names, columns, strict=True))
-        raise InputError(f"the vectors differ in length: {told}", where=str(path))
+        why = ", ".join(f"{name} {len(column)}" for name, column in zip(names, columns, strict=True))
+        raise InputError(f"the vectors differ in length: {why}", where=str(path))
     table = np.column_stack(columns)
     counts = RowCounts(rows_in=len(table), columns=header)
     block = Block(values=table, lines=np.arange(1, len(table) + 1))

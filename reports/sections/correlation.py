@@ -4,7 +4,7 @@ from dataclasses import replace
 
 from analyses.correlation.closed_loop import CorrelationResult
 from analyses.correlation.compare import SignalComparison
-from analyses.correlation.run import BESIDE, Correlation, SignalSummary, moves_alike, worst_of
+from analyses.correlation.run import BESIDE, Correlation, SignalSummary, follows_model, worst_of
 from analyses.records.consistency import left_out_of
 from analyses.records.naming import MEANINGS
 from reports import document as doc
@@ -55,7 +55,7 @@ def words(whole: Correlation) -> str:
         + "".join(f"; {_named(one.name).lower()} within {_share(one)}" for one in beside)
         + "."
     )
-    apart = [one.record for one in results if not moves_alike(one)]
+    apart = [one.record for one in results if not follows_model(one)]
     parts += [f"{record}: a fit below 0 %, the model moves otherwise." for record in apart]
     far = max((s for r in results for s in r.signals.values()), key=lambda s: s.share_beyond_noise)
     beyond = far.share_beyond_noise > limit

@@ -19,7 +19,7 @@ from reports.sections import identified
 def section(answer: CampaignAnswer) -> doc.Section:
     result, fit = answer.result, answer.result.fit
     blocks = [coefficient_table(fit), contribution_table(answer), surface_figure(fit)]
-    blocks += [region_figure(fit)] if len(fit.told) > 1 else []
+    blocks += [region_figure(fit)] if len(fit.determined) > 1 else []
     blocks += [residual_figure(fit), *window_figures(result), shared_table(fit)]
     blocks += [law_table(result.laws)] if result.laws is not None else []
     blocks += suggestion_blocks(answer.suggestion) if answer.suggestion is not None else []
@@ -41,7 +41,9 @@ def coefficient_table(fit: SurfaceFit) -> doc.Block:
     scatter = dict(zip(NAMES, (100.0 * random).tolist(), strict=True))
     more = [doc.of(scatter.get, "scatter", "Share of scatter", "%", format="fix:0")]
     for j, (key, name) in enumerate((("c0", "C0"), ("cv", "Cv"))):
-        both = {NAMES[k]: float(fit.correlation[k, j]) for k in fit.told if j < k and j in fit.told}
+        both = {
+            NAMES[k]: float(fit.correlation[k, j]) for k in fit.determined if j < k and j in fit.determined
+        }
         more.append(doc.of(both.get, key, f"r with {name}", format="fix:2"))
     note = (
         "Intervals by propagated distributions (GUM Supplement 1): Student for the scatter of the runs, "
@@ -223,7 +225,7 @@ def region_figure(fit: SurfaceFit) -> doc.Block:
     """Joint 95 % regions of pairs of coefficients, in percent of their values."""
     radius = float(np.sqrt(-2.0 * np.log(0.05)))  # chi-squared of two degrees of freedom
     chart = style.Chart(width=style.WIDE, height=300.0)
-    for i, j in combinations(fit.told, 2):
+    for i, j in combinations(fit.determined, 2):
         scale = 100.0 / fit.values[[i, j]]
         panel = chart.panel(f"{NAMES[i]}, % from its value", f"{NAMES[j]}, %", by_point=True)
         whole = _ellipse(fit.covariance, i, j, scale, radius)

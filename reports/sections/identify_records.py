@@ -109,7 +109,7 @@ def _parameters(model: JointModel, axis: str) -> doc.Block:
         "White residuals: ordinary least squares, as is usually published. Standard error: of "
         "residuals that are correlated and not alike everywhere, and the scatter between records where there "
         "are several; this one goes into the design."
-        + (f" Bias of the fit: {model.bias_told}." if model.bias_told else "")
+        + (f" Bias of the fit: {model.bias_note}." if model.bias_note else "")
     )
     return identified.parameter_table("Identified parameters", model, note, axis=axis, more=more)
 

@@ -329,7 +329,7 @@ def test_steps_of_the_voltage_between_the_samples_are_no_lag() -> None:
     model = result.model
     # over eight phases of these steps the inertia is 1.5e-3 off, rms: a smaller error would be a promise
     assert abs(model["inertia"] - inertia) < 2.0 * model.std("inertia") < 3e-3 * inertia
-    assert model.bias_told.endswith("and taken off")
+    assert model.bias_note.endswith("and taken off")
 
 
 OFF = {"motor.torque_constant": 1.03 * 5.9e-3, "motor.back_emf_constant": 1.03 * 5.9e-3}

@@ -233,7 +233,7 @@ def test_a_held_command_is_told_by_the_simulated_drive(form, dry, monkeypatch: p
     In sixteenths of a tick, as a quarter, to the first order in the motion, is off by 0.2 % of R itself.
     """
     monkeypatch.setitem(globals(), "STEPS", 16)
-    record = _every(_recorded(np.repeat(_command("sines")[:20_000:10], 10), "held"), 10)
+    record = _every(_recorded(np.repeat(_command("sines")[:12_000:10], 10), "held"), 10)
     changes = {"back_emf_constant": 0.047, "torque_constant": 0.047, "resistance": 0.55, "inductance": 2.5e-4}
     design = with_values(_design(**changes), {"friction.offset_torque": 0.2 * dry * DRY})
     design = design if dry else with_values(design, {"friction.dry_torque": 0.0})

@@ -4,10 +4,11 @@ A kernel for instructions that the processor does not have would end the process
 """
 
 import os
-import subprocess
 import sys
 
 from numpy._core._multiarray_umath import __cpu_dispatch__, __cpu_features__
+
+from reports.arithmetic import same_order
 
 _KERNELS = {  # OpenBLAS core type: what the processor must have
     "Nehalem": ("SSE42",),
@@ -34,12 +35,6 @@ def kinds() -> dict[str, dict[str, str]]:
     return result
 
 
-def own() -> str:
-    """The core type that OpenBLAS takes here as things are: `make test-all` has it."""
-    asked, command = os.environ | {"OPENBLAS_VERBOSE": "2"}, [sys.executable, "-c", "import numpy"]
-    told = subprocess.run(command, env=asked, capture_output=True, text=True, check=True).stderr
-    return told.partition("Core: ")[2].strip()
-
-
 if __name__ == "__main__":
-    sys.stdout.write("".join(f"OPENBLAS_CORETYPE={name}\n" for name in kernels() if name != own()))
+    of_all_tests = {**same_order(), **os.environ}.get("OPENBLAS_CORETYPE")
+    sys.stdout.write("".join(f"OPENBLAS_CORETYPE={name}\n" for name in kernels() if name != of_all_tests))

@@ -14,6 +14,7 @@ import pytest
 from beside import MOST, moved
 from machine_kinds import kernels, kinds
 
+from reports.arithmetic import same_order
 from tests.margins.margin_families import integrators_and_whole_samples, sections_permuted_and_scaled
 
 SCRIPT = Path(__file__).with_name("machine_facts.py")
@@ -34,11 +35,15 @@ def loops() -> str:
     return json.dumps([parts_of(loop) for loop in drawn])
 
 
+def unasked() -> dict[str, str]:
+    """The environment without what was asked of linear algebra."""
+    return {name: value for name, value in os.environ.items() if name not in _ASKED}
+
+
 @functools.cache
 def facts(kind: str | None) -> dict[str, Any]:
     """What the script prints on a machine of a kind; ``None``: as this machine is."""
-    environment = {name: value for name, value in os.environ.items() if name not in _ASKED}
-    environment |= kinds()[kind] if kind else {"OPENBLAS_NUM_THREADS": "1"}
+    environment = unasked() | (kinds()[kind] if kind else {"OPENBLAS_NUM_THREADS": "1"})
     command, kept = [sys.executable, "-W", "error", str(SCRIPT)], {"capture_output": True, "text": True}
     done = subprocess.run(command, input=loops(), env=environment, check=False, **kept)
     assert done.returncode == 0, done.stderr[-2000:]
@@ -67,6 +72,14 @@ def test_there_are_several_kinds() -> None:
     assert len(kinds()) >= 2
     if sys.platform == "linux" and os.uname().machine == "x86_64":
         assert len(kernels()) >= 1
+
+
+def test_the_kernel_that_all_tests_run_on_is_not_asked_again() -> None:
+    """It was, and that of a processor's own, with which nobody settles the order, was asked never."""
+    command = [sys.executable, str(SCRIPT.with_name("machine_kinds.py"))]
+    listed = subprocess.run(command, env=unasked(), capture_output=True, text=True, check=True).stdout
+    others = [name for name in kernels() if name != same_order().get("OPENBLAS_CORETYPE")]
+    assert listed.split() == [f"OPENBLAS_CORETYPE={name}" for name in others]
 
 
 @pytest.mark.parametrize("seed", range(3))
