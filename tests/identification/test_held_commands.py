@@ -1,11 +1,9 @@
 """Commands that are held, of a small motor whose truth is an integration of its own, noise in its loops."""
 
 from dataclasses import replace
-from math import copysign
 
 import numpy as np
 import pytest
-from scipy.linalg import expm
 from scipy.signal import lfilter
 
 from actuator_lti.design import read_design_text, with_values
@@ -20,11 +18,13 @@ from analyses.records.holds import hold_of
 from analyses.records.record import Record
 from nonlinear import commands, simulate
 from tests.identification.bench_records import errors_off, record_of
-from tests.identification.test_voltage_equation import RATIO, TEXT
+from tests.identification.test_voltage_equation import RATIO, STEPS, TEXT, TICK_S, Small, driven
 
-TICK_S, EVERY, STEPS = 1e-4, 10, 4  # the voltage acts half a tick after its sample
+EVERY = 10
 OHM, HENRY, BACK, INERTIA, DRY, VISCOUS = 34.5, 8.6e-3, 0.018, 6.35e-8, 3.6e-4, 1.26e-7
-OF_CURRENT, CURRENT_S, OF_SPEED, SPEED_S, OF_PLACE = 21.6, 2.5e-4, 8.9e-4, 0.016, 50.0
+OF_CURRENT, CURRENT_S, OF_SPEED, SPEED_S = 21.6, 2.5e-4, 8.9e-4, 0.016
+LOOPS = (OF_CURRENT, CURRENT_S, OF_SPEED, SPEED_S, 50.0)
+DRIVE = Small(OHM, HENRY, BACK, INERTIA, DRY, VISCOUS, LOOPS)
 TRUTH = {"resistance": OHM, "back_emf": BACK, "inertia": INERTIA, "dry": DRY, "viscous": VISCOUS}
 CHANGES = {
     "motor.resistance": 1.05 * OHM, "motor.inductance": 0.6 * HENRY, "motor.rotor_inertia": 0.95 * INERTIA,
@@ -40,39 +40,6 @@ def _design() -> Design:
     return with_values(read_design_text(TEXT), CHANGES)
 
 
-def _driven(command: np.ndarray, noise: np.ndarray) -> np.ndarray:
-    """Speed, current, voltage and angle at each quarter of a tick, shape (4 n, 4).
-
-    At a tick as the controller sees them; the voltage is that of the last one. Exact, but for the tick in
-    which the speed changes its sign.
-    """
-    table = np.zeros((5, 5))  # current, speed, angle; voltage, friction torque
-    table[0, [0, 1, 3]] = np.array([-OHM, -BACK, 1.0]) / HENRY
-    table[1, [0, 1, 4]] = np.array([BACK, -VISCOUS, -1.0]) / INERTIA
-    table[2, 1] = 1.0
-    (ii, iw, _, iu, it), (wi, ww, _, wu, wt), (ai, aw, _, au, at) = expm(table * TICK_S / STEPS)[:3].tolist()
-    i = w = angle = acting = of_speed = of_current = 0.0
-    rows = np.empty((len(command) * STEPS, 4))
-    for k, (wanted, (on_speed, on_current)) in enumerate(zip(command.tolist(), noise.tolist(), strict=True)):
-        speed, current = w + on_speed, i + on_current
-        off = OF_PLACE * (wanted - angle) - speed
-        of_speed += OF_SPEED * TICK_S / SPEED_S * off
-        off = OF_SPEED * off + of_speed - current
-        of_current += OF_CURRENT * TICK_S / CURRENT_S * off
-        voltage = OF_CURRENT * off + of_current
-        for step in range(STEPS):
-            rows[k * STEPS + step] = w + on_speed, i + on_current, voltage, angle
-            u = acting if 2 * step < STEPS else voltage
-            friction = copysign(DRY, w or BACK * i) if w or abs(BACK * i) > DRY else BACK * i
-            i, w, angle = (
-                ii * i + iw * w + iu * u + it * friction,
-                wi * i + ww * w + wu * u + wt * friction,
-                angle + ai * i + aw * w + au * u + at * friction,
-            )
-        acting = voltage
-    return rows
-
-
 def _record(
     hold: int, noise: float, seed: int, every: float = EVERY, late: int = 0, rows: int = 2000
 ) -> Record:
@@ -86,7 +53,7 @@ def _record(
     command = (command * np.clip(time / 0.3, 0.0, 1.0))[np.arange(len(time)) // hold * hold]
     on = noise * rng.standard_normal((len(time), 2)) * [600.0, 0.15]
     at = late + int(every * STEPS) * np.arange(rows)
-    speed, current, voltage, angle = _driven(RATIO * command, on)[at].T
+    speed, current, voltage, angle = driven(DRIVE, RATIO * command, on)[at].T
     motion = {"reference": command[at // STEPS], "angle": angle, "speed": speed}
     return record_of(TICK_S * every * np.arange(rows), "held", **motion, current=current, voltage=voltage)
 

@@ -15,7 +15,7 @@ from analyses.friction_effects.orbit import Orbit
 from analyses.friction_effects.result import limit_cycles
 from analyses.friction_effects.reversal import Hysteresis, _width, hysteresis
 from analyses.large_signal.tones import linear_steady_state
-from analyses.limit_cycles.stick_slip import stick_slip_cycle
+from analyses.limit_cycles.stick_slip import _runs, stick_slip_cycle
 from analyses.motion.settling import SMALL, settle, settlings_of
 from nonlinear import Rows
 from nonlinear.bench.operating_motion import quiet
@@ -230,6 +230,16 @@ def test_stick_slip_is_predicted(name: str) -> None:
     swing = cycles.hunting
     assert swing.swing_rad == pytest.approx(cycles.stick_slip.output_amplitude_rad, rel=3e-3)
     assert swing.rest.frequency_hz == pytest.approx(cycles.stick_slip.frequency_hz, rel=3e-3)
+
+
+def test_a_slip_of_a_multirate_drive_is_the_one_of_its_ticks() -> None:
+    """A map of so many periods holds from their first tick on, not from another."""
+    system, torques = assemble_loops("ilr33-amber-multirate").tick_system, np.array([-2e-3, 0.0])
+    x = np.random.default_rng(1).standard_normal((2, len(system.states)))
+    for k, seen in enumerate(_runs(system, x, torques, 7 * system.ticks).swapaxes(0, 1)):
+        assert seen == pytest.approx(x, rel=1e-9, abs=1e-9 * np.abs(x).max())
+        A, B, _, _ = system.matrices(k % system.ticks)
+        x = x @ A.T + np.outer(torques, B[:, 1])
 
 
 def test_stick_slip_needs_breakaway_above_friction_and_an_integral() -> None:
