@@ -97,9 +97,10 @@ class Sought:
             for taken in ways[:-1]:
                 with suppress(InputError, NumericalError):
                     tried += self._together(tried, taken) or []
-        if not (why := all(own is not None for own, _ in commands)):
+        tried = [one for one in tried if one.right.model.simulated]  # of no drive that can be, none is nearer
+        if not (recorded := all(own is not None for own, _ in commands)):
             tried = [one for one in tried if one.right.model.bias] or tried
-        misses = _misses(plain, [_both_ways(one) for one in tried]) if why else _left(tried)
+        misses = _misses(plain, [_both_ways(one) for one in tried]) if recorded else _left(tried)
         best = int(np.argmin(np.sum(misses, axis=1)))
         best_one = tried[best]
         for other, more in zip(tried, misses - misses[best], strict=True):
@@ -238,8 +239,7 @@ def _misses(design: Design, tried: Sequence[Both]) -> Floats:
         least = [AGREES**2 * np.mean(ways[0][0][name] ** 2) for name in names]
         size = np.maximum(np.min(np.mean(off**2, axis=2), axis=0), least)
         rows = np.sum(0.5 * off**2 / np.maximum(size, 1e-300)[:, None], axis=1)
-        blocks = np.array_split(rows, int(np.sqrt(rows.shape[1])), axis=1)
-        sums.append(np.transpose([np.sum(block, axis=1) for block in blocks]))
+        sums.append(_in_blocks(rows))
     return np.concatenate(sums, axis=1)
 
 
@@ -254,8 +254,13 @@ def _left(tried: Sequence[Found]) -> Floats:
         for weight, part, values in zip(model.weights, model.records, whole, strict=True):
             values[np.flatnonzero(part.keep)[part.compared]] = weight * part.noise
         rows.append(np.concatenate(whole) ** 2)
-    off = 0.5 * np.array(rows) / max(np.min(np.mean(rows, axis=1)), 1e-300)
-    return np.transpose([np.sum(b, axis=1) for b in np.array_split(off, int(np.sqrt(off.shape[1])), axis=1)])
+    return _in_blocks(0.5 * np.array(rows) / max(np.min(np.mean(rows, axis=1)), 1e-300))
+
+
+def _in_blocks(rows: Floats) -> Floats:
+    """The sums of n rows over root n blocks, shape (ways, blocks)."""
+    blocks = np.array_split(rows, int(np.sqrt(rows.shape[1])), axis=1)
+    return np.transpose([np.sum(block, axis=1) for block in blocks])
 
 
 def _missed(design: Design, own: Record, like: Record, name: str) -> Floats:

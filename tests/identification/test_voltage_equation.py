@@ -16,7 +16,8 @@ from analyses.identification.bench import BenchResult, identify_bench
 from analyses.identification.own_bias import in_counts
 from analyses.records.consistency import check_record
 from analyses.records.record import Record
-from tests.identification.bench_records import errors_off, item_of, record_of
+from nonlinear import commands, simulate
+from tests.identification.bench_records import bare, errors_off, item_of, record_of
 from tests.refusals import refused
 
 OHM, HENRY, BACK, RATIO = 0.6, 3e-4, 0.05, 50.0
@@ -198,6 +199,17 @@ def test_rows_at_the_ticks_of_the_position_loop_tell_the_inertia(gain, every, to
     assert errors_off(model, {"inertia": INERTIA}) < 3.5
     assert model["inertia"] == pytest.approx(INERTIA, rel=near)
     assert model.std("inertia") < near * INERTIA
+
+
+def test_a_way_to_take_the_command_that_no_drive_has_is_left_out() -> None:
+    """The one held between the rows came with a negative friction, of which nothing can be simulated."""
+    design = with_values(bare("ilr33-amber"), {"control.position.every": 10, "control.velocity.every": 2})
+    run = simulate(design, commands.multisine(0.004, [5, 17, 43], 4.0, 1e-4, seed=1), 4.0)
+    seen = {"reference": run.reference_rad, "angle": run.motor_angle_rad, "current": run.current_A}
+    seen["speed"] = run.motor_speed_rad_s
+    record = record_of(run.time_s[::20], **{name: values[::20] for name, values in seen.items()})
+    model = identify_bench(design, [record]).model
+    assert model["inertia"] == pytest.approx(design.inertia_kgm2, rel=5e-3)
 
 
 def test_the_drive_may_take_its_command_between_the_rows_in_straight_lines() -> None:

@@ -33,7 +33,8 @@ def loaded(code: str) -> set[str]:
     return set(done.stdout.splitlines()[-1].split())
 
 
-PLOTTING = {"control", "matplotlib", "scipy.signal", "scipy.stats", "pandas"}
+SLOW = {"scipy.signal", "scipy.stats", "scipy.optimize", "scipy.interpolate", "scipy.ndimage", "jinja2"}
+PLOTTING = {"control", "matplotlib", "pandas", *SLOW}
 READ = """import tempfile; from analyses.records.open_record import open_record
 with tempfile.NamedTemporaryFile("w", suffix=".csv") as file:
     file.write("time_s,speed_rad_s\\n0,1\\n1,2\\n2,nan\\n")
@@ -46,6 +47,7 @@ LIGHT = {
     "from actuator_lti import load_design; load_design('ilr33-amber')": {"matplotlib"},
     COMMAND.format(["--help"]): {"numpy", "scipy", "control", "matplotlib", "pydantic", "pandas"},
     COMMAND.format(["margins", "ilr33-amber"]): PLOTTING | {"dask"},
+    COMMAND.format(["duty", "joint"]): PLOTTING | {"dask"},
     READ: {"pandas", "scipy.signal"},
     COMMAND.format(["stiffness", "ilr33-amber", "--json"]): PLOTTING | {"dask"},
 }
