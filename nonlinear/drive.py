@@ -98,8 +98,8 @@ class Drive:
         """
         _check(command=command, load_Nm=load_Nm, torque_Nm=torque_Nm)
         self._io[at.IN_COMMAND] = command
-        if load_Nm or torque_Nm or self._p[at.HAS_CHANGING_LOAD]:
-            self._p[at.HAS_CHANGING_LOAD] = 1.0
+        if load_Nm or torque_Nm or self._p[at.LOAD_VARIES]:
+            self._p[at.LOAD_VARIES] = 1.0
             self._io[at.IN_LOAD], self._io[at.IN_TORQUE] = load_Nm, torque_Nm
         status = STATUS[self._tick()]
         if status != "ok":

@@ -81,10 +81,8 @@ def summary(made: Mapping[str, Any]) -> Tree:
     kept = [part for part in made["sections"] if part["id"] in ("answer", "provenance")]
     rows = []
     for part in (one for one in made["sections"] if one not in kept):
-        status = (
-            part["status"] if part["status"] in ("fail", "warn") else ""
-        )  # green is said of verdicts only
-        rows.append({"part": part["title"], "found": part.get("result") or "", "_status": status})
+        role = part["status"] if part["status"] in ("fail", "warn") else ""  # green is said of verdicts only
+        rows.append({"part": part["title"], "found": part.get("result") or "", "_status": role})
     columns = [column("part", "Section"), column("found", "Found")]
     found = table("What each section of the whole report says", columns, rows)
     return {**made, "sections": [*kept[:1], section("found", "Section by section", [found]), *kept[1:]]}
@@ -108,7 +106,7 @@ def printable(made: Mapping[str, Any]) -> Tree:
         "kicker": KICKERS.get(made.get("kind", "report"), "Report"),
         "title": clean(made.get("title"), MAX_TITLE),
         "subtitle": clean(made.get("subtitle"), 1200),
-        "overall": [[clean(words, 200), status] for words, status in verdict_lines(made["verdict"])],
+        "overall": [[clean(words, 200), role] for words, role in verdict_lines(made["verdict"])],
         "facts": [[label, clean(value, 200)] for label, value in rows if value],
         "revision": clean(design.get("revision"), 60),
         "verdicts": [_verdict(item) for item in judged(own)],  # what is signed

@@ -37,7 +37,7 @@ def drive_figures(population: Population, quantity: str, load_Nm: float = 0.0) -
         figure = drive_figure(population.stacked, quantity, load_Nm)
         return np.broadcast_to(np.asarray(figure, dtype=float), (population.count,))
     out = np.empty(population.count)
-    for group in population.same_structure():
+    for group in population.kinds():
         for first in range(0, len(group), _CHUNK):
             chosen = group[first : first + _CHUNK]
             out[chosen] = drive_figure(population.part(chosen).stacked, quantity, load_Nm)

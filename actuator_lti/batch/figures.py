@@ -18,7 +18,7 @@ from actuator_lti.drive.profile import command_mean
 from actuator_lti.drive.wiring import Drive, present, wire
 from actuator_lti.errors import InputError
 from actuator_lti.loops.periodic import fundamental, shown
-from actuator_lti.loops.sampled import command_response, fundamental_path, stage_blocks
+from actuator_lti.loops.sampled import commanded, fundamental_path, stage_blocks
 from actuator_lti.loops.tick import Block, TickProgram
 
 _CHUNK = 256
@@ -138,9 +138,7 @@ def linear_figures(
 
     def fill(of: Collection[str], some: Population, numbers: np.ndarray) -> None:
         chunks = (
-            group[first : first + _CHUNK]
-            for group in some.same_structure()
-            for first in range(0, len(group), _CHUNK)
+            group[first : first + _CHUNK] for group in some.kinds() for first in range(0, len(group), _CHUNK)
         )
 
         def one(chosen: np.ndarray) -> None:
@@ -172,7 +170,7 @@ def _hold(population: Population, at: Operating, loop: str, out: np.ndarray, tim
 
     def rows(chosen: np.ndarray, operating: Operating) -> np.ndarray:
         some, result = population.part(chosen), np.full((len(chosen), *out.shape[1:]), np.nan)
-        for group in some.same_structure():
+        for group in some.kinds():
             _fill(wire(some.part(group).stacked, operating), group, timed, result, (loop,))
         return result[:, place]
 
@@ -228,7 +226,7 @@ def _command_path(wired: Drive, stage: str) -> tuple[Any, Block | None]:
     whose command has a mean it is that to the reference, behind mean and filter.
     """
     if stage != "position":
-        return 0.0, command_response(wired, stage) if wired.responds_apart(stage) else None
+        return 0.0, commanded(wired, stage) if wired.responds_apart(stage) else None
     design, T = wired.design, wired.period_s("position")
     if command_mean(design.nominal or design):
         wired = wire(replace(design, command=Command()), wired.operating)

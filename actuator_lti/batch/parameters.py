@@ -60,7 +60,7 @@ class Population:
         values = {path: np.asarray(array)[chosen] for path, array in self.values.items()}
         return Population(self.design, values, len(np.arange(self.count)[chosen]))
 
-    def same_structure(self) -> Iterator[np.ndarray]:
+    def kinds(self) -> Iterator[np.ndarray]:
         """Numbers of designs with the same states: the same values are 0, as many ticks of delay."""
         control = self.stacked.controller
         whole, fraction = split_delay(control.computing_delay_s, control.period_s)

@@ -92,18 +92,13 @@ def finished(system: PlainDelaySystem, name: str, source: str, signal: str) -> A
 
 
 def open_loop(
-    wired: Drive,
-    place: str,
-    delays: frozenset[str],
-    opened: tuple[str, ...] = (),
-    *,
-    command_response: bool = False,
+    wired: Drive, place: str, delays: frozenset[str], opened: tuple[str, ...] = (), *, commanded: bool = False
 ) -> PlainDelaySystem:
     """The open loop of a stage at its own error, inner loops closed (unless opened), outer ones absent.
 
     Or that at a break point with all other loops closed; or how the stage answers its command.
     """
-    cut, signal, scale = wired.command_of(place) if command_response else wired.cut_of(place)
+    cut, signal, scale = wired.command_of(place) if commanded else wired.cut_of(place)
     outer = place if place in wired.stages else wired.outermost
     return joined(systems(FlowProgram(wired, outer, cut, opened, delays).flow(), "cut", signal, scale))
 
@@ -113,7 +108,7 @@ def loop(wired: Drive, place: str, delays: frozenset[str], opened: tuple[str, ..
     system = open_loop(wired, place, delays, opened)
     parts, own = (system, system.feedback(), static(np.eye(1)).feedback(system)), None
     if wired.responds_apart(place):
-        own = open_loop(wired, place, delays, opened, command_response=True)
+        own = open_loop(wired, place, delays, opened, commanded=True)
     return loop_of(wired, place, parts, own, finished)
 
 

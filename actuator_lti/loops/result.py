@@ -43,7 +43,7 @@ class Loop:
     T are the fundamental responses of the exact loop and L = T/S, see `actuator_lti.loops.periodic`.
     ``rotor``: "free" or "locked"; with a locked one there is a current loop alone.
     ``at_law``: whether it is the loop of a stage, cut at what a law of one's own gives.
-    ``plain_command_response``: of an inner stage with such a law its response from command to measured value:
+    ``plain_commanded``: of an inner stage with such a law its response from command to measured value:
     L/(1 + L) only where the law takes nothing but the error; else None.
     """
 
@@ -58,7 +58,7 @@ class Loop:
     periodic: bool = False
     rotor: RotorState = "free"
     at_law: bool = False
-    plain_command_response: Any = None
+    plain_commanded: Any = None
 
     @cached_property
     def open_loop(self) -> Any:
@@ -124,9 +124,7 @@ def loop_of(
         plain_sensitivity=named(parts[2], f"{label}_sensitivity", "reference", error), period_s=period_s,
         unit_in=unit, unit_out=unit, periodic=periodic, rotor=wired.operating.rotor,
         at_law=wired.has_own_law(place),
-        plain_command_response=(
-            None if own is None else named(own, f"{label}_command_response", "command", place)
-        ),
+        plain_commanded=None if own is None else named(own, f"{label}_commanded", "command", place),
     )  # fmt: skip
 
 

@@ -34,7 +34,7 @@ def loop(wired: Drive, place: str, opened: tuple[str, ...] = ()) -> Loop:
     block = fundamental(shown(blocks)).shown()
     period = wired.period_s(place if is_stage else wired.producer(place))
     parts, named = (block, block.feedback(), block.sensitivity()), partial(_system, period_s=period)
-    own = command_response(wired, place, opened).shown() if wired.responds_apart(place) else None
+    own = commanded(wired, place, opened).shown() if wired.responds_apart(place) else None
     return loop_of(wired, place, parts, own, named, period, periodic=len(blocks) > 1)
 
 
@@ -45,7 +45,7 @@ def reference_to_output(wired: Drive) -> PlainSystem:
     return _system(block.shown(), "reference_to_output", source, label, every * wired.tick_s)
 
 
-def command_response(wired: Drive, stage: str, opened: tuple[str, ...] = ()) -> Block:
+def commanded(wired: Drive, stage: str, opened: tuple[str, ...] = ()) -> Block:
     """Command of a stage behind its filter to what it measures, as `stage_blocks` has the other loops."""
     cut, signal, _ = wired.command_of(stage)
     return fundamental_path(TickProgram(wired, stage, cut, opened), wired.interval[stage], "cut", signal)

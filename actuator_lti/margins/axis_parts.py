@@ -56,9 +56,7 @@ def axis_parts(factors: Factored, band: tuple[float, float] | None) -> tuple[lis
         return [Part(factors, found, False)], listed_to, gain
     high, slope = _HIGH * most, factors.at_infinity
     if slope:
-        stop = _checked_end(
-            factors, max(high, 10.0 * high * math.exp(-factors.log_at(high)[0] / slope)), slope
-        )
+        stop = _sided(factors, max(high, 10.0 * high * math.exp(-factors.log_at(high)[0] / slope)), slope)
         return [Part(factors, factors.search(low, stop), False)], math.inf, 0.0
     middle, mirrored = 2.0 * most, factors.reciprocal()
     first = Part(factors, factors.search(low, middle), False)
@@ -110,7 +108,7 @@ def _start(factors: Factored, low: float) -> float:
         if abs(gain) < _NEAR_ONE:
             raise Doubtful(_ONE)
         return 0.0
-    return _checked_end(factors, min(low, 0.1 * low * math.exp(-factors.log_at(low)[0] / order)), order)
+    return _sided(factors, min(low, 0.1 * low * math.exp(-factors.log_at(low)[0] / order)), order)
 
 
 def _off_one(factors: Factored, end: float) -> float:
@@ -127,7 +125,7 @@ def _off_one(factors: Factored, end: float) -> float:
     return end
 
 
-def _checked_end(factors: Factored, end: float, slope: float) -> float:
+def _sided(factors: Factored, end: float, slope: float) -> float:
     """An end of the axis at which the side of the real axis on which the loop lies is known."""
     if not 1e-150 < end < 1e150:
         raise Doubtful("too wide a range")

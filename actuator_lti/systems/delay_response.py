@@ -42,10 +42,7 @@ class DelayResponse:
     @classmethod
     def of(cls, form: DelayForm) -> DelayResponse:
         loop, *others = exact_inside_delays(form, reduced=False)
-        N, D = (
-            _resolved(loop.N, [other.N for other in others]),
-            _resolved(loop.D, [other.D for other in others]),
-        )
+        N, D = (_known(loop.N, [other.N for other in others]), _known(loop.D, [other.D for other in others]))
         return cls(replace(loop, N=N, D=D))
 
     def behind_mean(self, samples: int, period_s: float) -> DelayResponse:
@@ -135,7 +132,7 @@ class DelayResponse:
         return 0 if real > 0 else 1 if rate < 0 else -1
 
 
-def _resolved(f: Quasi, others: list[Quasi]) -> Quasi:
+def _known(f: Quasi, others: list[Quasi]) -> Quasi:
     """The same with what the data do not tell from zero at s = 0 made zero."""
     series = [g.series(_AT_REST) for g in (f, *others)]
     for k in range(_AT_REST):

@@ -11,7 +11,7 @@ from actuator_lti.design.model import Design
 from actuator_lti.types import Floats
 from analyses.correlation.driving import Driven, command_of
 from analyses.estimation.least_squares import identifiable, solve
-from analyses.records.consistency import OVER, PROPORTIONAL, RATE_TOLERANCE, SURE, Finding
+from analyses.records.consistency import COSINE, OVER, RATE_TOLERANCE, SURE, Finding
 from analyses.records.driven_motion import ratio_of
 from analyses.records.record import Record
 
@@ -34,7 +34,7 @@ class Followed:
     @property
     def fails(self) -> bool:
         """Whether they are off by more than an interval can hold."""
-        return self.cosine < PROPORTIONAL or max(abs(self.clock), abs(self.off)) > RATE_TOLERANCE
+        return self.cosine < COSINE or max(abs(self.clock), abs(self.off)) > RATE_TOLERANCE
 
     @property
     def words(self) -> str:
@@ -43,7 +43,7 @@ class Followed:
             unit = "m" if self.place == "position" else "rad"
             why = f"the zero of the {self.place} is {self.zero:.4g} {unit} from that of its command"
             return f"{why}: offset of its column in a record file"
-        if self.cosine < PROPORTIONAL:
+        if self.cosine < COSINE:
             return f"the motion is not that of the command (correlation {self.cosine:.2f})"
         scale = "counts a revolution, the reduction, or a unit"
         what, ratio, of = "motion", 1.0 + self.clock, "which the loops make of the commanded speed"
@@ -96,7 +96,7 @@ def followed(
     position, error = control.position, _following_error(driven, place, model)
     if error is not None and position is not None and any(getattr(position, name) for name in FEED_FORWARD):
         fed = position.feedforward * np.gradient(error + model)
-        lags = ratio_of(error - error.mean(), np.gradient(model) - fed)[1] >= PROPORTIONAL
+        lags = ratio_of(error - error.mean(), np.gradient(model) - fed)[1] >= COSINE
     return Followed(driven.stage, cosine, clock, sum(off), limit, place, lags)
 
 
@@ -139,7 +139,7 @@ def following_finding(design: Design, one: Followed) -> Finding:
     loop, subject = design.controller.velocity, "following error against that of the design's loops"
     if one.zero:
         return Finding(subject, False, one.words)
-    if one.cosine < PROPORTIONAL:
+    if one.cosine < COSINE:
         return Finding(subject, None, one.words)
     if not one.fails:
         largest = 100.0 * max(abs(one.clock), abs(one.off))

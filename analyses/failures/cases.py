@@ -38,7 +38,7 @@ def plant_of(design: Design) -> Design:
     return replace(design, controller=bare, limits=limits, command=Command(), instruments=Instruments())
 
 
-class SplitDrive:
+class Halves:
     """The two halves; ``sensing`` changes what the controller gets, ``driving`` the voltage by (u, U_bus)."""
 
     def __init__(self, design: Design, load_Nm: float) -> None:
@@ -50,9 +50,9 @@ class SplitDrive:
         self.driving: Driving | None = None
         self.moment_Nm, self.jammed = 0.0, False
 
-    def copy(self) -> SplitDrive:
+    def copy(self) -> Halves:
         """Another one in the same state, nothing failed."""
-        twin = SplitDrive(self.design, self.load_Nm)
+        twin = Halves(self.design, self.load_Nm)
         twin.controller.set(self.controller.get())
         twin.plant.set(self.plant.get())
         return twin
@@ -144,9 +144,9 @@ class Case:
     """One failure."""
 
     name: str
-    words: str  # with {speed} and {energy} as in `SplitDrive.turning`
+    words: str  # with {speed} and {energy} as in `Halves.turning`
     command: CommandOverTime  # from the failure on (from the step on, where ``at_rad`` is given)
-    broken: Callable[[SplitDrive], None] = lambda _: None  # what is done to the split drive
+    broken: Callable[[Halves], None] = lambda _: None  # what is done to them
     start: float = 0.0  # command that the drive follows before
     at_rad: float | None = None  # when the output is this far from the start; ``None``: at once
     stops: bool = True  # whether the run ends at the stop
@@ -223,9 +223,9 @@ def _of_current(design: Design, asked: Asked) -> tuple[Case, ...]:
     )
 
 
-def _jam(split: SplitDrive) -> None:
-    split.fail(jammed(split.design))
-    split.jammed = True
+def _jam(halves: Halves) -> None:
+    halves.fail(jammed(halves.design))
+    halves.jammed = True
 
 
 def _swings(design: Design, size: float, around: float = 0.0) -> Iterator[Case]:
@@ -239,8 +239,8 @@ def _swings(design: Design, size: float, around: float = 0.0) -> Iterator[Case]:
         yield Case("oscillatory-command", words, command, start=around, stops=False)
 
 
-def _hard_over(split: SplitDrive, *, way: float) -> None:
-    split.driving = lambda _, bus: way * bus
+def _hard_over(halves: Halves, *, way: float) -> None:
+    halves.driving = lambda _, bus: way * bus
 
 
 def jammed(design: Design) -> Design:
@@ -256,21 +256,25 @@ def jammed(design: Design) -> Design:
     return replace(design, load=replace(design.load, friction=held))
 
 
-def _open(split: SplitDrive) -> None:
+def _open(halves: Halves) -> None:
     """No current flows."""
-    split.driving = lambda _, bus: 0.0
-    split.fail(replace(split.design, motor=split.design.motor.without_current, supply=None, temperature=None))
+    halves.driving = lambda _, bus: 0.0
+    halves.fail(
+        replace(halves.design, motor=halves.design.motor.without_current, supply=None, temperature=None)
+    )
 
 
-def _sense(split: SplitDrive, *, zero: bool = False) -> None:
+def _sense(halves: Halves, *, zero: bool = False) -> None:
     """Freeze the outermost loop's sensor, or let it read zero; a speed taken from it is zero."""
-    stage = split.design.controller.outermost
+    stage = halves.design.controller.outermost
     if stage == "current":
-        split.sensing = lambda true: replace(true, current_A=0.0)
+        halves.sensing = lambda true: replace(true, current_A=0.0)
         return
-    sensor, part = getattr(split.design.controller, stage).sensor, 0.0 if zero else 1.0
-    angle = part * getattr(split.measured(), f"{sensor}_angle_rad")
-    split.sensing = lambda true: replace(true, **{f"{sensor}_angle_rad": angle, f"{sensor}_speed_rad_s": 0.0})
+    sensor, part = getattr(halves.design.controller, stage).sensor, 0.0 if zero else 1.0
+    angle = part * getattr(halves.measured(), f"{sensor}_angle_rad")
+    halves.sensing = lambda true: replace(
+        true, **{f"{sensor}_angle_rad": angle, f"{sensor}_speed_rad_s": 0.0}
+    )
 
 
 def _sines(design: Design, size: float) -> Iterator[tuple[float, str]]:

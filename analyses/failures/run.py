@@ -13,7 +13,7 @@ from actuator_lti.drive.operating import follows_angle, runs, straight
 from actuator_lti.errors import InputError, NumericalError, UnstableError
 from actuator_lti.types import Floats
 from analyses.failures.asked import Asked
-from analyses.failures.cases import Case, SplitDrive, cases_of
+from analyses.failures.cases import Case, Halves, cases_of
 from analyses.motion.settling import Settling, counted, outcome, settle, settling_ticks_of
 from analyses.specification.capability import drive_figures
 from analyses.specification.requirements import RequirementVerdict, judged_by, tally
@@ -112,16 +112,16 @@ def failures(design: AnyDesign, asked: Asked | None = None) -> Failures:
     wait = ceil(_settling_s(design, asked) / design.controller.period_s)
     cases, left_out = cases_of(design, asked)
     before = {start: _before(design, asked.load_Nm, start) for start in sorted({c.start for c in cases})}
-    settled = {start: SplitDrive(design, asked.load_Nm) for start in before}
-    for start, split in settled.items():
+    settled = {start: Halves(design, asked.load_Nm) for start in before}
+    for start, halves in settled.items():
         rest = before[start].rest
         stays = rest.comes_to_rest and not (runs(design) and follows_angle(design))
-        _hold(split, start, wait, MOST_TICKS if stays else wait, 2.0 * rest.amplitude)
+        _hold(halves, start, wait, MOST_TICKS if stays else wait, 2.0 * rest.amplitude)
     made = dict[str, FailureCase]()
     for case in cases:
-        split = settled[case.start].copy()
-        if _reaches(split, case):
-            one = _followed(split, asked, case)
+        halves = settled[case.start].copy()
+        if _reaches(halves, case):
+            one = _followed(halves, asked, case)
             made[case.name] = _worse(made.get(case.name, one), one)
         else:
             left_out |= {case.name: f"its output does not get half-way to the stop in {LONGEST_S:g} s"}
@@ -143,21 +143,21 @@ def _worse(first: FailureCase, second: FailureCase) -> FailureCase:
     return replace(taken, **{name: max(getattr(first, name), getattr(second, name)) for name in peaks})
 
 
-def _hold(split: SplitDrive, start: float, wait: int, most: int, swing: float) -> None:
+def _hold(halves: Halves, start: float, wait: int, most: int, swing: float) -> None:
     """Hold a start until what it orders spans over ``wait`` ticks `SETTLED` of its size beside its swing.
 
     Whole periods of the controller: a failure comes as its outermost stage runs, when it does the most.
     """
-    whole = split.whole(start)
+    whole = halves.whole(start)
     wait = ceil(wait / whole.base_ticks) * whole.base_ticks
     for _ in range(0, most, wait):
         piece = whole.advance(wait)
         if piece.status != "ok":
             raise NumericalError(f"before a failure ({piece.status}): {ADVICE[piece.status]}")
-        seen = split.followed(piece)
+        seen = halves.followed(piece)
         if np.ptp(seen) <= SETTLED * abs(seen[-1]) + swing:
             break
-    split.go_on_from(whole)
+    halves.go_on_from(whole)
 
 
 def _settling_s(design: Design, asked: Asked) -> float:
@@ -173,17 +173,17 @@ def _settling_s(design: Design, asked: Asked) -> float:
     return min(0.1 + travel + ticks * period, MOST_TICKS * period)
 
 
-def _followed(split: SplitDrive, asked: Asked, case: Case) -> FailureCase:
+def _followed(halves: Halves, asked: Asked, case: Case) -> FailureCase:
     """What comes of a failure."""
-    Ts, start = split.design.controller.period_s, split.output_rad
-    words = case.words.format(**split.turning)
-    case.broken(split)
+    Ts, start = halves.design.controller.period_s, halves.output_rad
+    words = case.words.format(**halves.turning)
+    case.broken(halves)
     rows = []
     for k in range(ceil(asked.watched_s / Ts) + 1):
-        moved = split.output_rad - start
-        true = split.step(case.command(k * Ts))
-        overloaded = split.controller.value("overloaded")
-        rows.append((k * Ts, moved, true.output_speed_rad_s, true.current_A, split.moment_Nm, overloaded))
+        moved = halves.output_rad - start
+        true = halves.step(case.command(k * Ts))
+        overloaded = halves.controller.value("overloaded")
+        rows.append((k * Ts, moved, true.output_speed_rad_s, true.current_A, halves.moment_Nm, overloaded))
         if case.stops and abs(moved) >= asked.stop_rad:
             break
     t, free, speed, current, moment, overloaded = np.array(rows).T
@@ -207,13 +207,13 @@ def _followed(split: SplitDrive, asked: Asked, case: Case) -> FailureCase:
     )
 
 
-def _reaches(split: SplitDrive, case: Case) -> bool:
+def _reaches(halves: Halves, case: Case) -> bool:
     """Follow the command until the output is where the failure happens; whether it gets there."""
-    start, period = split.output_rad, split.design.controller.period_s
+    start, period = halves.output_rad, halves.design.controller.period_s
     for k in range(0 if case.at_rad is None else ceil(LONGEST_S / period)):
-        if abs(split.output_rad - start) >= (case.at_rad or 0.0):
+        if abs(halves.output_rad - start) >= (case.at_rad or 0.0):
             return True
-        split.step(case.command(k * period))
+        halves.step(case.command(k * period))
     return case.at_rad is None
 
 

@@ -32,7 +32,7 @@ from analyses.records.record import Record
 
 EXPLAINED = 0.01  # level above which a cause explains what is off
 LEAST_VALUES = 3
-PROPORTIONAL = 0.02
+COSINE = 0.02
 """Relative standard deviation within which a cause has to explain: rough numbers of a design that are off
 alike by chance are no cause."""
 FEW = 2.0  # least factor of a cause that only two values tell
@@ -142,11 +142,11 @@ def cause(values: Sequence[DesignValue]) -> tuple[str, float, float] | None:
     ('the scale of the current or the torque constant (and back-EMF constant)', 0.8)
     """
     x = np.log([one.ratio for one in values])
-    close = np.array([float(np.hypot(one.error / one.ratio, PROPORTIONAL)) for one in values])
+    close = np.array([float(np.hypot(one.error / one.ratio, COSINE)) for one in values])
     std = np.array([float(np.hypot(one.error / one.ratio, one.allowed)) for one in values])
     if len(values) < LEAST_VALUES or chi2.sf(float(np.sum((x / std) ** 2)), len(x)) > NO_CHANCE:
         return None
-    off = np.array([not one.within(PROPORTIONAL) for one in values])
+    off = np.array([not one.within(COSINE) for one in values])
     fitting: list[tuple[float, str, float, float]] = []
     for words, powers in CAUSES.items():
         g = np.array([powers.get(one.name.partition("_")[0], 0.0) for one in values])

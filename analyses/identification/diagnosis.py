@@ -26,7 +26,7 @@ from analyses.identification.rows import (
     record_rows,
     rows_under,
 )
-from analyses.records.consistency import PROPORTIONAL, SURE, Finding, clock_doubt, resistance_doubt
+from analyses.records.consistency import COSINE, SURE, Finding, clock_doubt, resistance_doubt
 from analyses.records.naming import KNOWN_UNITS, RATES
 from analyses.records.record import Record, lasting
 
@@ -138,7 +138,7 @@ def _with_lags(model: JointModel, lags: Sequence[tuple[Lag, float]]) -> JointMod
 def _followed(start: Design, record: Record, simulated: Mapping[str, Floats]) -> Followed | None:
     """As `followed`; where what was found does not even move as the record, by the design's own motion."""
     one = followed(start, record, simulated)
-    if one is not None and one.cosine < PROPORTIONAL:
+    if one is not None and one.cosine < COSINE:
         simulated = with_model_signals(start, simulated_part(start, record)).signals
         one = followed(start, record, simulated)
     return with_zero(start, simulated_part(start, record), one)

@@ -86,7 +86,7 @@ class _Likeliest:
     keys: tuple[str, ...]
     parts: Sequence[Record]
     sizes: Floats  # of what is left of each signal
-    scaled: Sequence[Pair]  # slopes of each over the values, what is left, of unit size
+    unit: Sequence[Pair]  # slopes of each over the values, what is left, of size one
     unlikely: float  # twice the negative logarithm of the likelihood of white noise, but for a constant
     freed: _Likeliest | None = None  # where the inductance is found too, though the records do not show it
 
@@ -100,9 +100,9 @@ class _Likeliest:
         """The values; in error by what an inductance that is not shown, and was kept, moves them by too."""
         pairs = [
             (_side_by_side(w, z), _side_by_side(e, d))
-            for (w, e), (z, d) in zip(self.scaled[::2], self.scaled[1::2], strict=True)
+            for (w, e), (z, d) in zip(self.unit[::2], self.unit[1::2], strict=True)
         ]
-        covariance, fixed = wider_covariance(self.scaled, pairs), {}
+        covariance, fixed = wider_covariance(self.unit, pairs), {}
         if self.freed is not None:
             covariance = covariance + self.away(self.freed)
             fixed = {"inductance": kept_inductance(self.design, NOT_SHOWN)}
@@ -190,15 +190,13 @@ class _Search:
                 start, sizes = found.design, found.sizes
                 continue
             here = list(parts)
-            scaled = [(w / size, e / size) for w, e, size in zip(slopes, rests, left, strict=True)]
-            gram = np.sum([w.T @ w for w, _ in scaled], axis=0)
+            unit = [(w / size, e / size) for w, e, size in zip(slopes, rests, left, strict=True)]
+            gram = np.sum([w.T @ w for w, _ in unit], axis=0)
             for k, part in enumerate(parts):
                 pair, at = slice(2 * k, 2 * k + 2), (start, part)
-                parts[k], scaled[pair], moves[k] = _at_its_rows(
-                    *at, sizes[pair], scaled[pair], gram, turn == 0
-                )
+                parts[k], unit[pair], moves[k] = _at_its_rows(*at, sizes[pair], unit[pair], gram, turn == 0)
             settled = np.all(np.abs(left - 1.0) < SETTLED) and moves.max() < SETTLED
-            found = _Likeliest(_one_constant(design, start), keys, list(parts), sizes, scaled, unlikely)
+            found = _Likeliest(_one_constant(design, start), keys, list(parts), sizes, unit, unlikely)
             if settled or before - unlikely < unlikely - than:
                 break
             before = unlikely
@@ -229,17 +227,17 @@ class _Search:
 
 
 def _at_its_rows(
-    design: Design, part: Record, sizes: Floats, scaled: Sequence[Pair], gram: Floats, anywhere: bool
+    design: Design, part: Record, sizes: Floats, unit: Sequence[Pair], gram: Floats, anywhere: bool
 ) -> tuple[Record, Sequence[Pair], float]:
     """A record with its rows where they likeliest are between the ticks, and the slopes without that.
 
-    ``scaled``: slopes over the values and what is left, of unit size. Also the move, in its standard errors;
+    ``unit``: slopes over the values and what is left, of size one. Also the move, in its standard errors;
     beforehand every time at which the rows show the same jumps is as likely. ``anywhere``: not only from
     where they are.
     """
     if (ends := later_s(design, part)) is None:
-        return part, scaled, 0.0
-    measured, w = measured_signals(design, part), np.concatenate([slopes for slopes, _ in scaled])
+        return part, unit, 0.0
+    measured, w = measured_signals(design, part), np.concatenate([slopes for slopes, _ in unit])
 
     def left(more: float) -> Floats:
         moved = replace(part, early_s=np.asarray(part.early_s) + more)
@@ -259,7 +257,7 @@ def _at_its_rows(
         more = float(column @ alone(rests[0]) + known * np.mean(ends)) / sure
         more = float(np.clip(more, ends[0] - 0.5 * wide, ends[1] + 0.5 * wide))
     w = w - np.outer(column, column @ w / (column @ column + known))
-    own = list(zip(np.split(w, 2), (rest for _, rest in scaled), strict=True))
+    own = list(zip(np.split(w, 2), (rest for _, rest in unit), strict=True))
     return replace(part, early_s=np.asarray(part.early_s) + more), own, abs(more) * float(np.sqrt(sure))
 
 

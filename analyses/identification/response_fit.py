@@ -19,7 +19,7 @@ from analyses.identification.response_model import Seen
 from analyses.identification.response_search import Point, Search
 from analyses.records.consistency import SURE
 
-NOT_DETERMINED = "not determined, the design's value kept"
+UNKNOWN = "not determined, the design's value kept"
 STARTS: tuple[float, ...] = 1.0, 0.25, 4.0
 """Stiffnesses to begin with, over the design's: an octave of the resonance to either side."""
 REACH = 30.0
@@ -146,9 +146,7 @@ def determined(start: Design, names: tuple[str, ...], seen: Seen, progress: Prog
         if not untold:
             fit = _determined(search, [best, *others], beside, joint, ends, level)
             own = {key: parameter_value(start, key) for key in left}
-            fixed = {
-                key: Fixed(value=own[key], reason=f"{why}: {NOT_DETERMINED}") for key, why in left.items()
-            }
+            fixed = {key: Fixed(value=own[key], reason=f"{why}: {UNKNOWN}") for key, why in left.items()}
             return replace(fit, fixed=fixed, misfit=float(np.sqrt(variance)) if seen.known else None)
         left, better = left | untold, []
     raise InputError(f"the response determines nothing of {', '.join(left)}", where=start.name)

@@ -268,10 +268,8 @@ def _balance(design: Design, record: Record, recipe: Recipe, *, gravity: bool) -
     if source:
         used[source] = "load" + (", its friction and its torque M/N" if free else ", its friction")
     if design.motor.over_angle.bends:
-        origin, drive = (
-            f"{origin} with the design's cogging",
-            drive + design.motor.over_angle.at(motion.position),
-        )
+        origin = f"{origin} with the design's cogging"
+        drive = drive + design.motor.over_angle.at(motion.position)
     if free:
         drive = drive + known / design.total_ratio
     if sides is not None:

@@ -20,8 +20,8 @@ from analyses.identification.friction_law import Bend
 from analyses.identification.joint_model import JointModel
 from analyses.identification.residuals import ResidualTest
 from analyses.records.consistency import (
+    COSINE,
     NO_CHANCE,
-    PROPORTIONAL,
     RATE_TOLERANCE,
     SURE,
     Finding,
@@ -278,6 +278,6 @@ def following_item(record: str, followed: Followed) -> Item:
     """Whether the record follows its command as the design's loops do at this motion."""
     label = f"{record}: the command is followed as by the design's loops"
     id = f"following-{record}"
-    if followed.zero or followed.cosine < PROPORTIONAL:
+    if followed.zero or followed.cosine < COSINE:
         return Item.of(id, label, followed.words)
     return share_item(id, label, max(abs(followed.clock), abs(followed.off)), RATE_TOLERANCE, followed.words)

@@ -152,10 +152,8 @@ def _turn(rows: Rows, cycle: describing.Cycle, period: float) -> int | None:
 
 def _ends(_: Rows, drives: Sequence[Running], window: int, count: int) -> Floats:
     """Half the span of the output in what motions end in, followed for no more than so many ticks of work."""
-    settlings = [judge(drive, count * window) for drive in drives]
-    return np.array(
-        [np.inf if one is None or one.verdict == "diverging" else one.amplitude for one in settlings]
-    )
+    ended = [judge(drive, count * window) for drive in drives]
+    return np.array([np.inf if one is None or one.verdict == "diverging" else one.amplitude for one in ended])
 
 
 def _sizes(rows: Rows, drives: Sequence[Running], window: int, count: int) -> Floats:

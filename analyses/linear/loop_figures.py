@@ -131,7 +131,7 @@ def loop_figures(
     Raises `InputError`, `NumericalError`: if the margins cannot be found; another figure that cannot becomes
     a note.
     """
-    responses = response, loop.plain_command_response, loop.plain_closed
+    responses = response, loop.plain_commanded, loop.plain_closed
     response = next(one for one in responses if one is not None)
     margins = stability_margins(loop.plain_open, certify=certify)
     if margins.stable is not True:

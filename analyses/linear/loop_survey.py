@@ -138,11 +138,9 @@ def survey_loops(design: AnyDesign, progress: Progress = None) -> LoopSurvey:
     tell(4, 6)
     budgets = attempt("delay budgets", lambda: _budgets(design, sampled), {})
     tell(5, 6)
-    linear_limit = attempt("limit of linear validity", lambda: _onset(loops, sampled), None)
+    limit = attempt("limit of linear validity", lambda: _onset(loops, sampled), None)
     tell(6, 6)
-    return LoopSurvey(
-        design, loops, forms, cuts, points, budgets, linear_limit, tuple(dict.fromkeys(refused))
-    )
+    return LoopSurvey(design, loops, forms, cuts, points, budgets, limit, tuple(dict.fromkeys(refused)))
 
 
 def _other_form(design: Design, form: Form, refused: list[str]) -> Mapping[str, LoopFigures]:
@@ -237,15 +235,15 @@ def _onset(loops: Loops, figures: Mapping[str, LoopFigures]) -> Onset | None:
     crossover = min((m.frequency_rad_s for m in result.margins.phase_margins), default=100.0)
     nyquist = min(path.nyquist_rad_s for path in loops.limiters.values())
     high = min(crossover * 30.0, nyquist * (1.0 - 1e-9))
-    linear_limit = with_cogging(loops, onset(loops, np.geomspace(crossover / 100.0, high, 160)))
-    return linear_limit if np.isfinite(linear_limit.amplitude_rad).any() else None
+    limit = with_cogging(loops, onset(loops, np.geomspace(crossover / 100.0, high, 160)))
+    return limit if np.isfinite(limit.amplitude_rad).any() else None
 
 
 COGGING_PART = 0.1
 """Of a period of the cogging, peak: its spring is 5 % softer there, 2 J1(x)/x of x = 0.2 pi."""
 
 
-def with_cogging(loops: Loops, linear_limit: Onset) -> Onset:
+def with_cogging(loops: Loops, limit: Onset) -> Onset:
     """The limit with ``"cogging"``: the linear loop has the spring that the cogging is at the motor's angle.
 
     Its line is where a sine turns the motor by `COGGING_PART` of a period.
@@ -253,11 +251,11 @@ def with_cogging(loops: Loops, linear_limit: Onset) -> Onset:
     design, response = loops.design, loops.plain_response
     outermost = design.controller.outermost
     if response is None or design.motor.cogging_Nm == 0.0 or outermost != "position":
-        return linear_limit
-    s = 1j * linear_limit.omega_rad_s
+        return limit
+    s = 1j * limit.omega_rad_s
     turned = np.abs(response(np.exp(s * response.dt))) * design.total_ratio
     own = COGGING_PART * 2.0 * np.pi / design.motor.cogging_periods / turned
-    first = own < linear_limit.amplitude_rad
-    active = tuple("cogging" if of else name for of, name in zip(first, linear_limit.active, strict=True))
-    lowest = np.minimum(own, linear_limit.amplitude_rad)
-    return Onset(linear_limit.omega_rad_s, lowest, active, {**linear_limit.each_rad, "cogging": own})
+    first = own < limit.amplitude_rad
+    active = tuple("cogging" if of else name for of, name in zip(first, limit.active, strict=True))
+    lowest = np.minimum(own, limit.amplitude_rad)
+    return Onset(limit.omega_rad_s, lowest, active, {**limit.each_rad, "cogging": own})

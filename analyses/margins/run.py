@@ -188,10 +188,8 @@ class Margins:
     @property
     def verdict(self) -> Verdict:
         """The requirements, and that every loop is stable."""
-        is_stable = Tally.of(
-            Verdict.of(one.is_stable) for one in (*self.loops.values(), *self.around.values())
-        )
-        return (tally(self.requirements) + is_stable).verdict
+        every = Tally.of(Verdict.of(one.is_stable) for one in (*self.loops.values(), *self.around.values()))
+        return (tally(self.requirements) + every).verdict
 
     @property
     def passed(self) -> bool:

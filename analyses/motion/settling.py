@@ -194,7 +194,7 @@ def judged_by(design: Design) -> str:
     return "" if asked is None else f"at most ±{asked.maximum:g} {asked.unit} by requirement {asked.id}"
 
 
-def swing_words(design: Design, swing: Settling, factor: float, unit: str) -> str:
+def worded(design: Design, swing: Settling, factor: float, unit: str) -> str:
     """`words` of a drive that does not come to rest, and by what that is accepted where it is."""
     said = words(swing.rest, factor, unit)
     accepts = verdict_of(design, swing) is Verdict.MET
@@ -206,7 +206,7 @@ def ending_of(design: Design, swing: Settling) -> str:
     scale, unit, load = (1e3, "mm", "N") if design.axis == "linear" else (degrees(1.0), "deg", "N m")
     under = f" under {swing.load_Nm:g} {load}" if swing.load_Nm else ""
     step = f"after a step of {scale * swing.amplitude_rad:.3g} {unit}{under}"
-    return f"{step}: {swing_words(design, swing, scale, unit)}"
+    return f"{step}: {worded(design, swing, scale, unit)}"
 
 
 def words(rest: Rest, factor: float, unit: str) -> str:

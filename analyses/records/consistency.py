@@ -16,13 +16,7 @@ from actuator_lti.types import Floats, Mask
 from analyses.estimation.least_squares import solve
 from analyses.estimation.parameters import own_share
 from analyses.records.differentiation import butterworth
-from analyses.records.driven_motion import (
-    PROPORTIONAL,
-    ratio_of,
-    turned_current,
-    wrong_time,
-    wrong_time_of_speed,
-)
+from analyses.records.driven_motion import COSINE, ratio_of, turned_current, wrong_time, wrong_time_of_speed
 from analyses.records.factors import explaining, named_factor, with_factor
 from analyses.records.naming import LOADS, RATES
 from analyses.records.record import DISORDER, HELD, Record, stretches
@@ -177,7 +171,7 @@ def rate_ratio(design: Design, record: Record) -> RateRatio | None:
     found, cosine = ratio_of(speed[moves], rate[moves])
     low, high = -inf, inf
     x, y = (_thinned(record, values) for values in (rate, speed))
-    if abs(cosine) >= PROPORTIONAL and found > 0.0 and len(x) >= LEAST_ROWS:
+    if abs(cosine) >= COSINE and found > 0.0 and len(x) >= LEAST_ROWS:
         bent = np.gradient(np.gradient(rate)) / 12.0  # what a straight line between two samples leaves out
         between = sum(abs(ratio_of(off[moves], rate[moves])[0]) for off in (0.5 * (last - first), bent))
         low, high = _bounds(y, x, np.gradient(x), np.gradient(y))
@@ -215,7 +209,7 @@ def _rate(ratio: RateRatio | None, design: Design, record: Record) -> Finding | 
     if ratio is None:
         return None
     subject, off = f"{name} against the rate of the {ratio.place}", ratio.found - 1.0
-    if abs(ratio.cosine) < PROPORTIONAL:
+    if abs(ratio.cosine) < COSINE:
         why = f"they are not alike (cosine {ratio.cosine:.2f})"
         rest = [other for other in record.signals if other not in (name, "angle", "output_angle", "position")]
         likes = {other: _smooth(record, record[other][1:])[ratio.moves] for other in rest}
@@ -378,7 +372,7 @@ def _reduction(design: Design, record: Record) -> Finding | None:
     a, b = (record[name] - record[name].mean() for name in ("angle", "output_angle"))
     ratio, cosine = ratio_of(a, design.total_ratio * b)
     subject = "angle against output angle"
-    if abs(cosine) < PROPORTIONAL:
+    if abs(cosine) < COSINE:
         return Finding(subject, False, "they are not alike")
     passed = abs(ratio - 1.0) <= RATE_TOLERANCE + _twist_share(design, record)
     text = f"the motor angle is {ratio:.4g} times the output angle and the reduction"
@@ -481,7 +475,7 @@ def _electrical(doubt: float, design: Design, record: Record) -> Finding | None:
 
     ``doubt`` is the share by which the clock may be off.
     """
-    if not (finding := _voltage_finding(design, record, doubt)):
+    if not (finding := _voltage_says(design, record, doubt)):
         return None
     (passed, words), u, i = finding, record["voltage"], record["current"]
     for cause, changed in (
@@ -491,11 +485,7 @@ def _electrical(doubt: float, design: Design, record: Record) -> Finding | None:
         ("the columns of current and voltage are swapped", {"voltage": i, "current": u}),
     ):
         other = replace(record, signals={**record.signals, **changed})
-        if (
-            passed is False
-            and (instead := _voltage_finding(design, other, doubt))
-            and instead[0] is not False
-        ):
+        if passed is False and (instead := _voltage_says(design, other, doubt)) and instead[0] is not False:
             return Finding("voltage against R i + kE w", False, f"{words}: {cause}")
     if passed is None and (stands := _standing_current(design, record)):
         passed, words = False, stands
@@ -504,7 +494,7 @@ def _electrical(doubt: float, design: Design, record: Record) -> Finding | None:
     return Finding("voltage against R i + kE w", passed, words)
 
 
-def _voltage_finding(design: Design, record: Record, doubt: float) -> tuple[bool | None, str] | None:
+def _voltage_says(design: Design, record: Record, doubt: float) -> tuple[bool | None, str] | None:
     """Whether each part of the voltage counts once, and in words; None where nothing tells."""
     parts = _electrical_parts(design, record).items()
     findings = [_counted(design, name, *ends, doubt if name == "kE w" else 0.0) for name, ends in parts]
@@ -582,7 +572,7 @@ def _load(design: Design, record: Record) -> Finding | None:
     load, torque = (_smooth(record, values) for values in (record[name], constant * record["current"]))
     for ratio in {1.0, design.total_ratio}:
         share, cosine = ratio_of(load, ratio * torque)
-        if cosine > PROPORTIONAL and abs(share - 1.0) <= SURE * own_share(design, "motor.torque_constant"):
+        if cosine > COSINE and abs(share - 1.0) <= SURE * own_share(design, "motor.torque_constant"):
             words = "kM i" if ratio == 1.0 else "kM i and the reduction"
             why = f"the {name} is {share:.4g} times {words}: the drive's own (leave the column out), "
             why += "or a load of turned sign: positive drives forward"

@@ -10,7 +10,7 @@ from analyses.records.factors import NEAR, named_factor
 from analyses.records.naming import LOADS, RATES
 from analyses.records.record import Record
 
-PROPORTIONAL = 0.9  # cosine above which one signal is taken to be a multiple of the other
+COSINE = 0.9  # cosine above which one signal is taken to be a multiple of the other
 TIMES = (60.0, 1e3, 1e6)  # min, ms and us read as s
 
 
@@ -38,7 +38,7 @@ def wrong_time(design: Design, record: Record, place: Floats) -> str:
     lag, cosine = ratio_of(error - error.mean(), np.gradient(place, record.time_s))
     ratio = lag * loop.gain
     size = max(ratio, 1.0 / ratio) if ratio > 0.0 else 1.0
-    if cosine < PROPORTIONAL or not any(abs(size / factor - 1.0) < NEAR for factor in TIMES):
+    if cosine < COSINE or not any(abs(size / factor - 1.0) < NEAR for factor in TIMES):
         return ""
     why = f"the motion lags its command by {lag:.3g} s, {ratio:.4g} times what the loop's gain makes"
     return f"{why}: factor {named_factor(ratio)}, in the unit of the time"
@@ -64,7 +64,7 @@ def wrong_time_of_speed(design: Design, record: Record) -> str:
     _, cosine = ratio_of(torque, parts @ shares)
     units = (factor**side for factor in TIMES[1:] for side in (1, -1))
     factor = next((one for one in units if 0.5 < inertia / one < 2.0 and 0.5 < one * inverse < 2.0), None)
-    if cosine < PROPORTIONAL or not 0.5 < friction < 2.0 or factor is None:
+    if cosine < COSINE or not 0.5 < friction < 2.0 or factor is None:
         return ""
     why = f"by the current the inertia is {inertia:.4g} times the design's, the friction {friction:.4g}"
     return f"{why} times: factor {named_factor(factor)}, in the unit of the time"
@@ -90,7 +90,7 @@ def turned_current(design: Design, record: Record, current: Floats, speed: Float
         return ""
     torque = np.add(*_own_torques(design, speed, record))
     _, cosine = ratio_of(current - current.mean(), torque - torque.mean())
-    if cosine > -PROPORTIONAL:
+    if cosine > -COSINE:
         return ""
     why = "the sign of the current is turned, or that of the motion: the current drives against the torque"
     return f"{why} that the design needs for it (cosine {cosine:.2f})"

@@ -101,11 +101,9 @@ class Stiffness:
     def lost_motion_difference(self) -> float | None:
         """Relative difference of lost motion as predicted and as simulated; None where it was not read."""
         lost = self.lost_motion
-        return (
-            None
-            if lost is None or lost.simulated_rad is None
-            else abs(lost.simulated_rad / lost.predicted_rad - 1.0)
-        )
+        if lost is None or lost.simulated_rad is None:
+            return None
+        return abs(lost.simulated_rad / lost.predicted_rad - 1.0)
 
     @cached_property
     def requirements(self) -> tuple[RequirementVerdict, ...]:

@@ -253,7 +253,7 @@ LENGTH = DECAY + 2  # of the two segments, s
     SMOOTH,  # 1: no dry friction and one viscous slope, so nothing happens at w = 0
     LOOK,  # 1: no short way over a segment: tanh law, elastic, or w' may turn twice within
     SPLIT,  # 1: the computing delay has a fraction of a tick
-    HAS_CHANGING_LOAD,  # 1: the load changes from tick to tick
+    LOAD_VARIES,  # 1: the load changes from tick to tick
     HAS_INSTRUMENTS,  # 1: instruments or the supply are modelled
     HAS_FULL_COMMAND,  # 1: the outermost stage is more than the P loop of position
     HAS_MEASURED_SPEED,  # 1: the measured speed is not w itself

@@ -125,7 +125,7 @@ def hold(p, s, io):
     for j in range(layout.S_QUEUE, last):
         s[j] = s[j + 1]
     s[last] = applied_voltage(p, s, io)
-    if p[layout.HAS_CHANGING_LOAD] > 0.0:
+    if p[layout.LOAD_VARIES] > 0.0:
         io[layout.IO_MOMENT] = hinge_moment(p, s, io)
         put_load(p, s, io[layout.IO_MOMENT], shaft_torque(p, s, io))
 

@@ -31,7 +31,7 @@ def record(p, io, history, rows, flag_history, row):
         for j in range(layout.ELASTIC_COLUMNS):
             history[(col + j) * rows + row] = io[layout.IO_OUTPUT_SPEED + j]
         col += layout.ELASTIC_COLUMNS
-    if p[layout.HAS_CHANGING_LOAD] > 0.0:
+    if p[layout.LOAD_VARIES] > 0.0:
         history[col * rows + row] = io[layout.IO_MOMENT]
 
 
@@ -142,7 +142,7 @@ def run_block(p, s, io, block, first, count, history, flag_history, out):
     every, rows = int(p[layout.RECORD_EVERY]), flag_history.shape[0]
     row = int((first + every - 1) / every)
     to_record = row * every if rows > 0 else -1
-    feeding = p[layout.PROBING] > 0.0 or p[layout.HAS_CHANGING_LOAD] > 0.0
+    feeding = p[layout.PROBING] > 0.0 or p[layout.LOAD_VARIES] > 0.0
     supplied = p[layout.SUPPLY] >= layout.SUPPLY_LIMITS
     reducing = p[layout.WINDOW] > 0.0 or p[layout.WITH_EXTREMES] > 0.0 or p[layout.STEP_TARGET] != 0.0
     flags, since, k = 0.0, first, first

@@ -80,7 +80,7 @@ def prepare_gates(p):
     p[layout.HAS_FULL_CURRENT] = max(more, any_of(p, layout.CURRENT_WINDUP, layout.CURRENT_TRACKING))
     more = max(p[layout.SUPPLY], any_of(p, layout.OUTPUT_SENSOR, layout.POSITION_COUNTS))
     p[layout.HAS_INSTRUMENTS] = max(more, any_of(p, layout.CURRENT_RESOLUTION, layout.SEED))
-    p[layout.HAS_CHANGING_LOAD] = any_of(p, layout.LOAD_SLOPE, layout.SUPPLY_TABLE)
+    p[layout.LOAD_VARIES] = any_of(p, layout.LOAD_SLOPE, layout.SUPPLY_TABLE)
     p[layout.OWN_MEASURES] = 0.0
     if p[layout.OWN_STAGE] > 0.0:
         prepare_own(p)

@@ -62,7 +62,7 @@ class Injection:
         """Without counts; the load is looked at in every tick where it is what is moved."""
         p[COUNTS] = 0.0
         if self.place == "load":
-            p[at.HAS_CHANGING_LOAD] = 1.0
+            p[at.LOAD_VARIES] = 1.0
 
     def run(self, drive: Running, states: Floats, values: Floats) -> Floats:
         """Run every state to the next update with its own value; what is read, shape (states, readings).

@@ -134,9 +134,7 @@ def replaced(text: str, values: Mapping[str, str]) -> str:
 def header_text() -> str:
     """``drive.h``: lengths, places in the rows with units and words, prototypes."""
     outputs = [(n, v) for n, v in names_of(at.IO_REFERENCE, at.IO_SIZE, "IO_") if n != "IO_SIZE"]
-    derived = [
-        (n, getattr(at, n)) for n in ("DELAY_LINE", "HAS_CHANGING_LOAD", "STATE_SIZE", "PARAMETER_SIZE")
-    ]
+    derived = [(n, getattr(at, n)) for n in ("DELAY_LINE", "LOAD_VARIES", "STATE_SIZE", "PARAMETER_SIZE")]
     groups = (
         ("Parameters p: of a run, then what drive_derive derives from them", parameter_names()),
         ("Derived parameters that a program may want", derived),

@@ -178,7 +178,7 @@ class Running:
         """Room for the columns of a run, its flags and its results."""
         p, every = self.p, int(self.p[at.RECORD_EVERY])
         rows = (int(p[at.TICKS]) + every - 1) // every
-        columns = at.HISTORY_PROBES + 2 * len(self.probing) + int(p[at.HAS_CHANGING_LOAD] > 0.0)
+        columns = at.HISTORY_PROBES + 2 * len(self.probing) + int(p[at.LOAD_VARIES] > 0.0)
         columns += at.ELASTIC_COLUMNS * int(p[at.ELASTIC_DRIVE])
         if 8 * rows * columns > HISTORY_BYTES.most:
             message = f"{p[at.TICKS]:.0f} ticks: a history of {rows} rows does not fit into memory"

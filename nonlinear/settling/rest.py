@@ -214,7 +214,7 @@ class _Watch:
         if p[at.HAS_CURRENT] > 0.0 and p[at.HAS_VELOCITY] <= 0.0:
             return np.stack([columns[0], columns[3], columns[3]])
         if p[at.ELASTIC_DRIVE] > 0.0:
-            place = columns.shape[0] - at.ELASTIC_COLUMNS - int(p[at.HAS_CHANGING_LOAD] > 0.0)
+            place = columns.shape[0] - at.ELASTIC_COLUMNS - int(p[at.LOAD_VARIES] > 0.0)
             return np.stack([columns[0], columns[place], w])
         return np.stack([columns[0], w, w])
 

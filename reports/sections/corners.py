@@ -29,11 +29,9 @@ def section(result: Corners) -> doc.Section:
     blocks = [_summary_table(result)]
     if result.corners[0].figures:
         blocks += [doc.figure("corners", chart(result), caption, alt=alt), details]
-    severity = doc.severity(result.verdict)
+    grave = doc.severity(result.verdict)
     words = summary(result)
-    return doc.section(
-        "corners", "Corners", blocks, result=words, intro=intro, status=severity, severity=severity
-    )
+    return doc.section("corners", "Corners", blocks, result=words, intro=intro, status=grave, severity=grave)
 
 
 def summary(result: Corners) -> str:

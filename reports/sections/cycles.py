@@ -24,10 +24,10 @@ def section(result: LimitCycles) -> doc.Section:
     causes = " or ".join(CAUSES[name] for name in result.looked_for) or "play or a quantised output sensor"
     none = doc.text(f"No limit cycle of {causes} is predicted.")
     predicted = _predicted(result, fine) if result.cycles else none
-    severity = doc.severity(result.verdict)
+    grave = doc.severity(result.verdict)
     blocks, words = [predicted, _rests(result, fine)], summary(result)
     return doc.section(
-        "cycles", "Limit cycles", blocks, result=words, intro=intro, status=severity, severity=severity
+        "cycles", "Limit cycles", blocks, result=words, intro=intro, status=grave, severity=grave
     )
 
 

@@ -31,13 +31,11 @@ def section(result: Duty) -> doc.Section:
     if result.overload is None:
         note += " No overload state: the design states no limits.peak_time."
     table = doc.table("What the duty asks of the motor", _COLUMNS, _rows(result), note)
-    severity = doc.severity(result.verdict)
-    severity = "warn" if severity == "info" and result.limited else severity
+    grave = doc.severity(result.verdict)
+    grave = "warn" if grave == "info" and result.limited else grave
     own = requirements.table(result.requirements)
     blocks, words = [table, *own, _figure(result)], summary(result)
-    return doc.section(
-        "duty", "Duty cycle", blocks, result=words, intro=intro, status=severity, severity=severity
-    )
+    return doc.section("duty", "Duty cycle", blocks, result=words, intro=intro, status=grave, severity=grave)
 
 
 RATED = {

@@ -7,7 +7,7 @@ import numpy as np
 
 from actuator_lti.asked.verdict import Verdict
 from analyses.failures.run import Failures
-from analyses.motion.settling import acting, noticed, swing_words, verdict_of
+from analyses.motion.settling import acting, noticed, verdict_of, worded
 from reports import document as doc
 from reports.charts import style
 from reports.numbers import seconds, short
@@ -33,7 +33,7 @@ def section(result: Failures) -> doc.Section:
     if asked.speed_rad_s:
         held = f"turns at a command of {out.per('s').of(asked.speed_rad_s)}{acting(result.before[0].rest)}"
     if swing is not None:
-        held = f"{_unsteady(result)}, {swing_words(result.design, swing, *command_unit(result.design))},"
+        held = f"{_unsteady(result)}, {worded(result.design, swing, *command_unit(result.design))},"
     stop = f"the stop is {out.of(asked.stop_rad, 4)} away" if asked.stop_rad < inf else "no stop is stated"
     intro = (
         f"Each failure is simulated from a drive that {held} under {load} (positive pushes forward). "
@@ -83,9 +83,7 @@ def summary(result: Failures) -> str:
     swing = noticed(result.design, result.before)
     if swing is not None and verdict_of(result.design, swing) is not Verdict.MET:
         does = f"{_unsteady(result)} under {result.asked.load_Nm:g} {result.design.load_unit}"
-        words += (
-            f"; before it the drive {does}: {swing_words(result.design, swing, *command_unit(result.design))}"
-        )
+        words += f"; before it the drive {does}: {worded(result.design, swing, *command_unit(result.design))}"
     return f"{NAMES[worst.name]} {words}. {requirements.result(result.requirements)}".rstrip()
 
 

@@ -172,10 +172,8 @@ def operating_points(points: Sequence[OperatingPointFigures], design: Design) ->
 
 
 def _spread(points: Sequence[OperatingPointFigures]) -> str:
-    for stability, words in ((False, "Unstable"), (None, "Stability is not known")):
-        here = [
-            p.place or p.label for p in points if any(f.is_stable is stability for f in p.figures.values())
-        ]
+    for one, words in ((False, "Unstable"), (None, "Stability is not known")):
+        here = [p.place or p.label for p in points if any(f.is_stable is one for f in p.figures.values())]
         if here:
             return f"{words} at {len(here)} of {len(points)} operating points: {'; '.join(here)}."
     each = [(f"{n} loop, {p.place or p.label}", f.judged) for p in points for n, f in p.figures.items()]

@@ -8,14 +8,7 @@ from actuator_lti.design.model import Command, Design
 from actuator_lti.drive.steady import torque_gain_Nm_rad
 from analyses.friction_effects.result import FrictionEffects, FrictionPoint
 from analyses.limit_cycles.run import CycleResult
-from analyses.motion.settling import (
-    FROM_THE_LARGEST,
-    Settling,
-    accepted_rad,
-    noticed,
-    swing_words,
-    verdict_of,
-)
+from analyses.motion.settling import FROM_THE_LARGEST, Settling, accepted_rad, noticed, verdict_of, worded
 from analyses.motion.settling import words as end_words
 from nonlinear.bench.operating_motion import quiet
 from reports import document as doc
@@ -52,7 +45,7 @@ def _cycle_verdict(design: Design, point: FrictionPoint, fine: Unit, load: str) 
         slip = f"±{size} at {one.frequency_hz:.3g} Hz{kind}"
     sizes = len(cycles.settlings)
     result = f"at rest after steps of {sizes} sizes" if sizes > 1 else "at rest after a step of one size"
-    result = result if swing is None else swing_words(design, swing, *fine)
+    result = result if swing is None else worded(design, swing, *fine)
     alone = " without counts and noise" if swing is not None and quiet(design) != design else ""
     agree = "as predicted" if cycles.as_predicted else "not as predicted"
     if not cycles.described:
@@ -222,7 +215,7 @@ def _figure(result: FrictionEffects, fine: Unit, load: str) -> list[doc.Block]:
 def _summary(result: FrictionEffects, fine: Unit) -> str:
     settlings = [one for point in result.points for one in point.cycles.settlings]
     if (swing := noticed(result.design, settlings)) is not None:
-        why = swing_words(result.design, swing, *fine)
+        why = worded(result.design, swing, *fine)
         alone = "Without counts and noise a" if quiet(result.design) != result.design else "A"
         return f"{alone} step does not come to rest: {why}."
     if any(abs(one.rest.error) > LEFT * one.amplitude_rad for one in settlings):

@@ -20,32 +20,32 @@ from reports.charts import style
 from reports.sections.names import Unit, command_unit, hertz
 
 
-def section(design: Design, linear_limit: Onset) -> doc.Section:
+def section(design: Design, onset: Onset) -> doc.Section:
     scale, unit = command_unit(design)
     where = ", at the output," if design.controller.outermost in ("position", "velocity") else ""
     caption = (
         f"Peak amplitude of a sine command{where} at which each limit is just reached. Below the "
         "lowest line every linear figure of this report holds, except for dry friction."
     )
-    rows = _rows(design, linear_limit, scale)
+    rows = _rows(design, onset, scale)
     columns = [
         doc.of("amplitude", "amplitude", "Command amplitude", unit, format="short:3"),
         doc.of("fraction", "fraction", "Of full deflection", "%", scale=100.0, format="fix:0"),
         doc.of("hz", "hz", "Linear up to", "Hz", format="sig:3"),
         doc.of("limiter", "limiter", "Then limited by"),
     ]
-    blocks = [doc.figure("onset", _chart(design, linear_limit, scale, unit), caption)]
+    blocks = [doc.figure("onset", _chart(design, onset, scale, unit), caption)]
     blocks += [doc.listing("How far the linear model reaches", rows, columns)] if rows else []
     intro = "A linear prediction ends where a limit is reached. Which one, and when, depends on frequency."
-    words = _result(rows, linear_limit, scale, unit)
+    words = _result(rows, onset, scale, unit)
     title = "Validity of the linear model"
     return doc.section("limits", title, blocks, result=words, intro=intro, severity="info")
 
 
-def _chart(design: Design, linear_limit: Onset, scale: float, unit: str) -> style.Chart:
+def _chart(design: Design, onset: Onset, scale: float, unit: str) -> style.Chart:
     title = "limit reached at this amplitude"
     chart, panel = style.plot(370.0, y=f"command amplitude, {unit}", log="y", legend=True, legend_title=title)
-    hertz, lowest = linear_limit.omega_rad_s / (2.0 * np.pi), scale * linear_limit.amplitude_rad
+    hertz, lowest = onset.omega_rad_s / (2.0 * np.pi), scale * onset.amplitude_rad
     there, full = np.isfinite(lowest), _full(design) * scale
     top = 4.0 * max([full, *lowest[there][:1]]) if there.any() else 1.0
     bottom = max(0.6 * min(lowest[there], default=0.1), top / 1e6)
@@ -54,7 +54,7 @@ def _chart(design: Design, linear_limit: Onset, scale: float, unit: str) -> styl
     if there.any():
         x, y, floor = hertz[there].tolist(), lowest[there].tolist(), bottom * 1e-3
         panel.shape([([*x, x[-1], x[0]], [*y, floor, floor])], colour=style.GREEN, opacity=0.1)
-    _onsets(panel, hertz, linear_limit.each_rad, scale)
+    _onsets(panel, hertz, onset.each_rad, scale)
     panel.note("linear below the lowest line", corner="bottom left", colour=style.MUTED)
     if full:
         panel.rule_y(full, f"full deflection {full:g} {unit}", colour=style.INK, dash=2)
@@ -66,7 +66,7 @@ def _full(design: Design) -> float:
     return design.validation.full_deflection_rad if design.controller.position is not None else 0.0
 
 
-def _result(rows: Sequence[_Linear], linear_limit: Onset, scale: float, unit: str) -> str:
+def _result(rows: Sequence[_Linear], onset: Onset, scale: float, unit: str) -> str:
     if rows:
         row = max(rows, key=lambda row: row.amplitude)
         part = f"{100.0 * row.fraction:.0f} % of " * (row.fraction != 1.0) + "full deflection"
@@ -76,14 +76,11 @@ def _result(rows: Sequence[_Linear], linear_limit: Onset, scale: float, unit: st
         if row.hz is None:
             return f"{size} stays linear over the whole frequency range."
         return f"{size} stays linear up to {row.hz:.3g} Hz; above, the {_noun(row.limiter)} acts."
-    if not np.isfinite(linear_limit.amplitude_rad).any():
+    if not np.isfinite(onset.amplitude_rad).any():
         return "No limit is reached by a sine command over the whole frequency range."
-    k = int(np.argmin(linear_limit.amplitude_rad))
-    size, limit = (
-        f"{scale * linear_limit.amplitude_rad[k]:.3g} {unit}",
-        _noun(words_of(linear_limit.active[k])),
-    )
-    at = f"{hertz(linear_limit.omega_rad_s[k]):.3g} Hz"
+    k = int(np.argmin(onset.amplitude_rad))
+    size, limit = (f"{scale * onset.amplitude_rad[k]:.3g} {unit}", _noun(words_of(onset.active[k])))
+    at = f"{hertz(onset.omega_rad_s[k]):.3g} Hz"
     return f"Sines up to {size} stay linear; above, the {limit} acts first, at {at}."
 
 
@@ -105,24 +102,24 @@ class _Linear:
     limiter: str
 
 
-def _rows(design: Design, linear_limit: Onset, scale: float) -> list[_Linear]:
+def _rows(design: Design, onset: Onset, scale: float) -> list[_Linear]:
     rows: list[_Linear] = []
     for fraction in design.validation.amplitude_fractions if _full(design) else ():
         amplitude, up_to, limiter = fraction * _full(design), None, "none in this range"
-        reached = np.nonzero(linear_limit.amplitude_rad < amplitude)[0]
+        reached = np.nonzero(onset.amplitude_rad < amplitude)[0]
         if len(reached):
-            up_to = hertz(_crossing(linear_limit, int(reached[0]), amplitude)) if reached[0] else 0.0
-            limiter = words_of(linear_limit.active[int(reached[0])])
+            up_to = hertz(_crossing(onset, int(reached[0]), amplitude)) if reached[0] else 0.0
+            limiter = words_of(onset.active[int(reached[0])])
         rows.append(_Linear(amplitude * scale, fraction, up_to, limiter))
     return rows
 
 
-def _crossing(linear_limit: Onset, first: int, amplitude: float) -> float:
+def _crossing(onset: Onset, first: int, amplitude: float) -> float:
     """Interpolate, on logarithmic scales, where the linear_limit falls to an amplitude."""
-    if first == 0 or not math.isfinite(linear_limit.amplitude_rad[first - 1]):
-        return float(linear_limit.omega_rad_s[first])
+    if first == 0 or not math.isfinite(onset.amplitude_rad[first - 1]):
+        return float(onset.omega_rad_s[first])
     both = [first, first - 1]  # the amplitude falls
-    known, omega = np.log(linear_limit.amplitude_rad[both]), np.log(linear_limit.omega_rad_s[both])
+    known, omega = np.log(onset.amplitude_rad[both]), np.log(onset.omega_rad_s[both])
     return float(np.exp(np.interp(math.log(amplitude), known, omega)))
 
 

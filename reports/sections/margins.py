@@ -114,14 +114,11 @@ def brief(result: Margins) -> Brief:
     head = f"{result.design.name}: {result.asked.form}, {_where(result)}"
     tables = [margin_table(own), spread_table(result.operating_points, known), response_table(every)]
     counts = [len(one.margins.gain_margins) + len(one.margins.phase_margins) for one in known.values()]
-    more, extra = [crossing_table(own)] if max(counts, default=0) > 2 else [], list[str]()
+    more, said = [crossing_table(own)] if max(counts, default=0) > 2 else [], list[str]()
     if result.measured is not None:
         more += [block for block in measured.blocks(result.measured) if block["kind"] == "table"]
-        extra += [
-            measured.words(result.measured),
-            *(f"measured loop: {one}" for one in result.measured.notes),
-        ]
-    notes = [*extra, *by_itself_notes(known), *evidence_notes(known), *_notes(result, known)]
+        said += [measured.words(result.measured), *(f"measured loop: {one}" for one in result.measured.notes)]
+    notes = [*said, *by_itself_notes(known), *evidence_notes(known), *_notes(result, known)]
     shown = [side_by_side(head, tables), *more] if known else []
     return Brief(first["result"], [*shown, *judged["blocks"]], notes)
 

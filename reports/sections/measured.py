@@ -14,12 +14,10 @@ from reports.sections.names import LOOPS, hertz
 def words(one: Measured) -> str:
     db, deg = np.abs(one.difference_db), np.abs(one.difference_deg)
     ends = f"{db.max():.2f} dB (at {one.frequency_hz[db.argmax()]:.4g} Hz) and {deg.max():.1f} deg"
-    sentence = (
-        f"The model explains the measurement within {ends} (at {one.frequency_hz[deg.argmax()]:.4g} Hz)"
-    )
-    sentence += f"; rms {np.sqrt((db**2).mean()):.2f} dB, {np.sqrt((deg**2).mean()):.1f} deg"
+    said = f"The model explains the measurement within {ends} (at {one.frequency_hz[deg.argmax()]:.4g} Hz)"
+    said += f"; rms {np.sqrt((db**2).mean()):.2f} dB, {np.sqrt((deg**2).mean()):.1f} deg"
     if one.radius.any():
-        sentence += f"; at {one.within} of {db.size} points it lies within the spread ({one.source})"
+        said += f"; at {one.within} of {db.size} points it lies within the spread ({one.source})"
     like = ""
     if one.nearer:
         of, off = one.nearer
@@ -28,7 +26,7 @@ def words(one: Measured) -> str:
     beyond = f" {one.beyond} points above half the sampling frequency are left out." if one.beyond else ""
     left = f" {one.left_out} rows without numbers or at 0 Hz are left out." if one.left_out else ""
     read = f" {one.read_as[:1].upper()}{one.read_as[1:]}." if one.read_as else ""
-    return f"{one.name} over the {_place(one)}. {sentence}.{like}{beyond}{left}{read} {one.note}".strip()
+    return f"{one.name} over the {_place(one)}. {said}.{like}{beyond}{left}{read} {one.note}".strip()
 
 
 ASKED = {

@@ -28,15 +28,13 @@ def section(result: Specification) -> doc.Section:
         "Closed form and simulation side by side, behind the profile of the command; manoeuvres and steps "
         "with it. Output side unless a column says motor."
     )
-    words, findings = _result(result), list[doc.Finding]()
+    words, more = _result(result), list[doc.Finding]()
     for one in result.capabilities:
         if one.duty is not None and one.duty < 0.995:
             load = f"{one.figures.load_Nm:g} {result.design.load_unit}"
             text = f"At {load} load the continuous current allows a duty of {100.0 * one.duty:.0f} %."
-            findings.append(doc.Finding(severity="warn", text=text, where="specification"))
-    return doc.section(
-        "specification", "Actuator figures", blocks, result=words, intro=intro, findings=findings
-    )
+            more.append(doc.Finding(severity="warn", text=text, where="specification"))
+    return doc.section("specification", "Actuator figures", blocks, result=words, intro=intro, findings=more)
 
 
 def _result(result: Specification) -> str:

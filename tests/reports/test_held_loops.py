@@ -75,10 +75,8 @@ def test_the_current_loop_is_judged_with_the_rotor_held() -> None:
     design = pushed(controller={"computing_delay_s": 0.0})
     figures = all_loop_figures(assemble_loops(design))
     current, expected = figures["current"], held_phase_margin_deg(design)
-    assert (current.margins.stable, current.is_stable) == (
-        False,
-        True,
-    )  # J s^2 + Cv s - k: a root on the right
+    # J s^2 + Cv s - k: a root on the right
+    assert (current.margins.stable, current.is_stable) == (False, True)
     assert figures["position"].stable
     # without a load that pushes, an unstable current loop inside a stable drive stays what it is
     own = all_loop_figures(assemble_loops(overfed()))

@@ -12,7 +12,7 @@ from actuator_lti import InputError, assemble_loops
 from actuator_lti.design import load_design, read_design_text, with_overrides
 from actuator_lti.design.model import Load, PositionLoop
 from analyses.failures import Asked, failures
-from analyses.failures.cases import SplitDrive, _sines, cases_of
+from analyses.failures.cases import Halves, _sines, cases_of
 from analyses.failures.run import MOST_TICKS, _followed, _hold, _settling_s, _worse
 from nonlinear import commands, simulate
 from reports.charts.svg import draw_svg
@@ -32,11 +32,11 @@ def test_two_halves_without_a_failure_are_the_drive(name: str) -> None:
     load = 0.5 * max(design.validation.loads_Nm)
     run = simulate(design, commands.step(size), ticks * design.controller.period_s, load)
     for begun in (0, 700):
-        split = SplitDrive(design, load)
-        whole = split.whole(size)
-        assert split.followed(whole.advance(begun)).tolist() == run.followed[:begun].tolist()
-        split.go_on_from(whole)
-        seen = [split.step(size) for _ in range(begun, ticks)]
+        halves = Halves(design, load)
+        whole = halves.whole(size)
+        assert halves.followed(whole.advance(begun)).tolist() == run.followed[:begun].tolist()
+        halves.go_on_from(whole)
+        seen = [halves.step(size) for _ in range(begun, ticks)]
         assert [one.output_angle_rad for one in seen] == run.output_angle_rad[begun:].tolist()
         assert [one.current_A for one in seen] == run.current_A[begun:].tolist()
 
@@ -216,7 +216,7 @@ def test_no_deflection_is_beyond_the_stop_and_a_drive_without_a_current_limit_ha
     free = replace(found.asked, stop_rad=10.0)
     case, other = (
         found.case("hard-over"),
-        _followed(SplitDrive(design, 0.0), free, cases_of(design, free)[0][0]),
+        _followed(Halves(design, 0.0), free, cases_of(design, free)[0][0]),
     )
     assert case.at_detection_rad == found.asked.stop_rad == case.deflection_rad.max()
     assert case.to_stop_s == np.interp(found.asked.stop_rad, other.deflection_rad, other.time_s)
@@ -248,12 +248,12 @@ def test_a_jam_at_speed_is_left_out_where_the_drive_is_too_slow() -> None:
 def test_a_self_locking_drive_is_where_it_holds_before_a_failure() -> None:
     """Kv = 2 1/s alone: a thousandth is left after ln(1000)/2 = 3.45 s; no load torque shows that pole."""
     slow = changed(AMBER, controller={"position": {"gain": 2.0}})
-    asked, split = Asked.of(slow), SplitDrive(slow, 0.0)
+    asked, halves = Asked.of(slow), Halves(slow, 0.0)
     wait = _settling_s(slow, asked)
     assert wait > 3.45
-    _hold(split, half := 0.5 * asked.stop_rad, round(wait / slow.controller.period_s), MOST_TICKS, 0.0)
-    assert split.output_rad == pytest.approx(half, rel=1e-3)
-    assert split.measured().motor_speed_rad_s == pytest.approx(0.0, abs=1e-3)
+    _hold(halves, half := 0.5 * asked.stop_rad, round(wait / slow.controller.period_s), MOST_TICKS, 0.0)
+    assert halves.output_rad == pytest.approx(half, rel=1e-3)
+    assert halves.measured().motor_speed_rad_s == pytest.approx(0.0, abs=1e-3)
 
 
 SLOT_CAR = """
@@ -278,9 +278,9 @@ velocity = {gain = "10 mV*s/rad", integral_time = "60 ms"}
 
 def test_a_drive_that_its_counts_swing_for_ever_is_not_waited_for(monkeypatch) -> None:
     """By +-0.98 thousandths of its speed: rest, and never within a thousandth from end to end."""
-    design, followed, gone = read_design_text(SLOT_CAR), SplitDrive.followed, list[int]()
+    design, followed, gone = read_design_text(SLOT_CAR), Halves.followed, list[int]()
     monkeypatch.setattr(
-        SplitDrive, "followed", lambda split, p: gone.append(p.flags.size) or followed(split, p)
+        Halves, "followed", lambda halves, p: gone.append(p.flags.size) or followed(halves, p)
     )
     result = failures(design, Asked.of(design, watched_s=0.01, detection_s=0.01))
     (before,) = result.before

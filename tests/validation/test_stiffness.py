@@ -111,9 +111,8 @@ def test_an_integral_on_the_output_comes_back_and_a_self_locking_gear_does_not_m
     rigid = stiffness(load_design("ilr33-amber"))
     assert all(curve.static_Nm_rad == float("inf") for curve in rigid.curves)
     assert rigid.lost_motion is None
-    assert [check.simulated_Nm_rad for check in rigid.checks] == 3 * [
-        complex(np.inf)
-    ]  # pushed, and not moved
+    # pushed, and not moved
+    assert [check.simulated_Nm_rad for check in rigid.checks] == 3 * [complex(np.inf)]
     assert rigid.verdict == "met"
     moved = replace(rigid.checks[0], simulated_Nm_rad=1e9 + 0j)
     assert replace(rigid, checks=(moved,)).verdict == "not met"

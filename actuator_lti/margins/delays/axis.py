@@ -103,7 +103,7 @@ def zeros(axis: Axis, q: Form, edges: list[float]) -> list[arb]:
     result: list[arb] = []
     order_at_zero = 0 if edges[0] else q.order(axis.loop)
 
-    def is_resolved(low: float, high: float) -> bool:
+    def known(low: float, high: float) -> bool:
         if low == 0.0 and order_at_zero:
             if high < _NARROWEST * edges[1]:
                 raise NumericalError("a crossing next to zero frequency could not be determined")
@@ -119,19 +119,17 @@ def zeros(axis: Axis, q: Form, edges: list[float]) -> list[arb]:
             return True
         return False
 
-    _halved_until(
-        is_resolved, edges, "what the loop does near {:.10g} rad/s could not be determined: a touch"
-    )
+    _halved_until(known, edges, "what the loop does near {:.10g} rad/s could not be determined: a touch")
     return result
 
 
-def _halved_until(is_resolved: Callable[[float, float], bool], edges: list[float], why: str) -> None:
+def _halved_until(known: Callable[[float, float], bool], edges: list[float], why: str) -> None:
     """Go through the intervals between the edges in order; those of which nothing is told are halved."""
     stack, count = [*pairwise(edges)][::-1], 0
     while stack:
         low, high = stack.pop()
         count += 1
-        if is_resolved(low, high):
+        if known(low, high):
             continue
         if count > _MOST_INTERVALS:
             raise NumericalError(
@@ -169,7 +167,7 @@ def turn(axis: Axis, edges: list[float]) -> arb:
     """Change of the angle of N + D along the intervals, rad."""
     total, last = arb(0), sum(axis.values(arb(0)), acb(0))
 
-    def is_resolved(low: float, high: float) -> bool:
+    def known(low: float, high: float) -> bool:
         nonlocal total, last
         N, D = axis.over(low, high)
         F = N + D
@@ -181,9 +179,7 @@ def turn(axis: Axis, edges: list[float]) -> arb:
         return True
 
     _halved_until(
-        is_resolved,
-        edges,
-        "the turn of 1 + L near {:.10g} rad/s could not be determined from one through zero",
+        known, edges, "the turn of 1 + L near {:.10g} rad/s could not be determined from one through zero"
     )
     return total
 

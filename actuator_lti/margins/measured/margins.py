@@ -27,7 +27,7 @@ from actuator_lti.measured.response import MeasuredResponse, measured_response
 from actuator_lti.types import Complex, Real
 
 _MOST_UNRESOLVED = 0.5
-_LISTED = 6
+_MOST = 6
 _OPEN = "as it is known: crossings there are neither sure nor excluded"
 _NOTES = (
     "measured data: stability cannot be determined from them, and outside of their band nothing is known",
@@ -215,13 +215,11 @@ def _passages(
             yield group, *at
         elif not result.unresolved[group.first : group.last + 1].all():  # told already
             doubtful.append(group)
-    brackets = [group.bracket(omega) for group in doubtful]
-    if len(brackets) > _LISTED:
-        notes.append(
-            f"at {len(brackets)} places {between_text(brackets[0][0], brackets[-1][1])} {what} {_OPEN}"
-        )
+    spans = [group.bracket(omega) for group in doubtful]
+    if len(spans) > _MOST:
+        notes.append(f"at {len(spans)} places {between_text(spans[0][0], spans[-1][1])} {what} {_OPEN}")
     else:
-        notes += [f"{between_text(*ends)} {what} {_OPEN}" for ends in brackets]
+        notes += [f"{between_text(*ends)} {what} {_OPEN}" for ends in spans]
 
 
 def _phase_margins(
@@ -269,7 +267,7 @@ def _reason(omega: Real, result: Bounds, known: bool) -> str:
 def _hidden(omega: Real, result: Bounds) -> list[str]:
     notes = []
     places = np.flatnonzero(result.unresolved)
-    for k in places[:_LISTED].tolist():
+    for k in places[:_MOST].tolist():
         deg = math.degrees(result.turn[k])
         what = "a resonance" if deg < -25.0 else "an antiresonance" if deg > 25.0 else "something steep"
         if abs(deg) > 140.0:
@@ -278,10 +276,9 @@ def _hidden(omega: Real, result: Bounds) -> list[str]:
             f"{between_text(omega[k], omega[k + 1])} the phase turns by {deg:+.0f} deg: {what} lies "
             "between these points; the gain there is not known, crossings are not excluded"
         )
-    if places.size > _LISTED:
+    if places.size > _MOST:
         notes.append(
-            f"the same in {places.size - _LISTED} more intervals, up to "
-            f"{frequency_text(omega[places[-1] + 1])}"
+            f"the same in {places.size - _MOST} more intervals, up to {frequency_text(omega[places[-1] + 1])}"
         )
     return notes
 
