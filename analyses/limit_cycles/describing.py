@@ -6,8 +6,8 @@ Play: the torque's fundamental is that of the coupling with k and c times ``n(x)
 sqrt(1 - x^2))``, x = b/A. Dry friction: the slope ``4 Tc/(pi W)``, W the amplitude of its speed; none of
 breakaway, at which a sinusoid spends no time, and in cycles of play none by load. Quantisation: an angle that
 swings about the edge of a count is a relay, ``2 q/(pi A)`` up to A = q; the loop of its sensor (the motor's:
-of the speed made of it) has the cycle at the gain g that brings it to its stability limit:
-``A = 2 q/(pi g)``, stable.
+of the speed made of it) has the cycle at the gain g that brings it to the limit: ``A = 2 q/(pi g)``,
+stable.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -234,9 +234,9 @@ def cycles_of_quantisation(design: Design, causes: Iterable[Cause] = tuple(SENSO
     for cause in causes:
         if not counts_matter(design, cause):
             continue
-        critical_gain = _limit_at_output(free) if cause == "quantisation" else _limit_of_speed(free)
-        if critical_gain is not None:
-            gain, mode = critical_gain
+        limit = _limit_at_output(free) if cause == "quantisation" else _limit_of_speed(free)
+        if limit is not None:
+            gain, mode = limit
             amplitude = 2.0 * (quantum_of(design, cause) or 0.0) / (pi * gain)
             seen = output_of(free, mode.shape) if cause == "quantisation" else mode.shape["th"]
             found.append(_cycle(cause, free, mode, amplitude, seen, friction=False, stable=True))
