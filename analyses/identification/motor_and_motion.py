@@ -29,7 +29,7 @@ from analyses.identification.held_command import found_together, motion_of, moto
 from analyses.identification.inverse import fit_records
 from analyses.identification.joint_model import NAMES, FrictionForm, JointModel, Recipe
 from analyses.identification.motion_noise import with_noise_of_motion
-from analyses.identification.own_bias import without_bias
+from analyses.identification.own_bias import holds_between, without_bias
 from analyses.identification.run_down import fit_run_downs, runs_down
 from analyses.records.consistency import resistance_doubt
 from analyses.records.record import HELD, SMOOTH, Record
@@ -110,11 +110,10 @@ class Sought:
         return best_one
 
     def _ways(self, own: Driven | None, record: Record) -> set[str]:
-        """How a command may go on between the rows; one that is not recorded smooth or, of few rows, held."""
+        """How a command may go on between the rows; one not recorded smooth or, by a slow loop, held."""
         if own is not None:
             return {one.between for one in readings(own, record)}
-        slow = self.plain.controller.position and record.period_s > 1.5 * self.plain.controller.period_s
-        return {SMOOTH, HELD} if slow else {SMOOTH}
+        return {SMOOTH, HELD} if holds_between(self.plain, record) else {SMOOTH}
 
     def _with_scale_of_current(self, motor: ElectricalFit, right: Diagnosed) -> Found:
         """What was found; what the current may be too small by is in R and L as it is in all torques."""

@@ -53,7 +53,8 @@ def without_bias(
     """
     less = model
     driven: tuple[Record, ...] = ()
-    learnt = any(command_of(start, record) is None for record in records)
+    lacking = [record for record in records if command_of(start, record) is None]
+    roughly = not all(holds_between(start, record) for record in lacking)
     fit = same_fit(start, model)
     for _ in range(ROUNDS):
         try:
@@ -68,7 +69,8 @@ def without_bias(
             again = fit([one.without({"output_angle"} - part.used.keys()) for one, part in pairs])
         except (InputError, NumericalError) as error:
             return replace(less, bias_note=f"not taken off: {error}")
-        before, less = less, replace(_corrected(start, made, model, again, learnt), simulated=less.simulated)
+        made_of = _corrected(start, made, model, again, learnt=bool(lacking), roughly=roughly)
+        before, less = less, replace(made_of, simulated=less.simulated)
         if not less.bias or np.all(np.abs(less.values - before.values) < SETTLED * less.standard_errors):
             break
     return less
@@ -88,7 +90,9 @@ def same_fit(start: Design, model: JointModel) -> Callable[[Sequence[Record]], J
     )
 
 
-def _corrected(start: Design, made: Design, model: JointModel, again: JointModel, learnt: bool) -> JointModel:
+def _corrected(
+    start: Design, made: Design, model: JointModel, again: JointModel, *, learnt: bool, roughly: bool
+) -> JointModel:  # fmt: skip
     parts = with_noise(model, again)
     triples = list(zip(model.weights, model.records, parts, strict=True))
     weighed = [(weight * part.w[part.compared], weight * part.noise) for weight, _, part in triples]
@@ -98,9 +102,11 @@ def _corrected(start: Design, made: Design, model: JointModel, again: JointModel
     found = {n: again[n] - default_value(made, n, start) for n in model.names if n in again.names}
     bias = np.array([found.get(name, 0.0) for name in model.names])
     table = np.concatenate([slopes for slopes, _ in weighed])
-    if np.linalg.norm(table @ bias) > LARGEST_BIAS * np.linalg.norm(table @ model.values):
-        slopes = f"not taken off: more than {100 * LARGEST_BIAS:g} % of the drive"
-        return replace(less, bias_note=f"{slopes}; the intervals hold it").wider(bias)
+    whole = np.linalg.norm(table @ bias) > LARGEST_BIAS * np.linalg.norm(table @ model.values)
+    large = _large(model, bias) if roughly else ["the drive"] if whole else []
+    if large:
+        why = f"not taken off: more than {100 * LARGEST_BIAS:g} % of {', '.join(large)}"
+        return replace(less, bias_note=f"{why}; the intervals hold it").wider(bias)
     singles = zip(model.alone, again.alone, weighed, strict=False)
     less = replace(
         less,
@@ -110,8 +116,20 @@ def _corrected(start: Design, made: Design, model: JointModel, again: JointModel
         bias=dict(zip(model.names, bias.tolist(), strict=True)),
         bias_note="found on records simulated with the result, and taken off",
     )
-    less = less.wider(_not_shared(model, again) * bias) if learnt else less
+    less = less.wider(_not_shared(model, again) * bias) if learnt and not roughly else less
     return with_scatter(start, less.wider(_by_direction(model, again)))
+
+
+def _large(model: JointModel, bias: Floats) -> list[str]:
+    """Values with a bias that is much of them or, where they may be zero, of their kind or error.
+
+    Of a command that was learnt roughly: a drive that sticks moves otherwise between the rows.
+    """
+    gravity = float(np.hypot(model.get("gravity_sin", 0.0), model.get("gravity_cos", 0.0)))
+    dry = next((abs(model[n]) for n in ("dry", "dry_forward", "map_0") if n in model), 0.0)
+    like = [gravity if n.startswith("gravity") else dry if n == "offset" else 0.0 for n in model.names]
+    sizes = np.maximum(np.maximum(np.abs(model.values), like), model.standard_errors / LARGEST_BIAS)
+    return [n for n, b, s in zip(model.names, bias, sizes, strict=True) if abs(b) > LARGEST_BIAS * s]
 
 
 def _not_shared(model: JointModel, again: JointModel) -> float:
@@ -191,8 +209,8 @@ def _cannot(design: Design, records: Sequence[Record]) -> str:
 def _driven(design: Design, record: Record) -> Record:
     """The record, or its first part; without a command it gets one that moves the drive as recorded.
 
-    It is learnt: what the simulated motion lacks is added over the response of the linear loops, as long as
-    it comes nearer.
+    It is learnt: what the simulated motion lacks is added over the response of the loops, as long as it comes
+    nearer where that is exact.
     """
     record = simulated_part(design, record)
     if command_of(design, record) is not None:
@@ -203,18 +221,38 @@ def _driven(design: Design, record: Record) -> Record:
         return motion_of(design, record, recipe_for(record))[0].position
 
     wanted = command = place(record)
-    turned = np.pi * np.arange(len(wanted) + 1) / len(wanted)  # lines of the motion to and back
-    inverse = 1.0 / response_of(design)(turned / record.period_s)
+    step, exact = _step_of(design, record, len(wanted)), holds_between(design, record)
     driven, nearest = record, np.inf
-    for _ in range(COMMAND_ROUNDS):
+    for _ in range(COMMAND_ROUNDS if exact else COMMAND_ROUNDS // 2):
         signals = {**record.signals, name: command / design.total_ratio}
         tried = replace(record, signals=signals, between=record.between or SMOOTH)
         off = wanted - place(with_model_signals(design, tried))
-        if not (size := float(off @ off)) < nearest:
+        if exact and not (size := float(off @ off)) < nearest:
             break
-        driven, nearest = tried, size
-        command = command + irfft(inverse * rfft(np.append(off, off[::-1])))[: len(off)]
+        driven, nearest = tried, size if exact else np.inf
+        command = command + step(off)
     return driven
+
+
+def holds_between(design: Design, record: Record) -> bool:
+    """Whether a slower loop holds what it asks for over ticks that lie between the rows."""
+    position, tick_s = design.controller.position, design.controller.period_s
+    return position is not None and position.every > 1 and record.period_s > 1.5 * tick_s
+
+
+def _step_of(design: Design, record: Record, count: int) -> Callable[[Floats], Floats]:
+    """What is added to a command for what the motion lacks.
+
+    Over the response of the linear loops; where none holds what it asks for between the rows, over
+    gain/(s + gain), about the position loop, which asks for less where a drive sticks.
+    """
+    period_s = record.period_s
+    if not holds_between(design, record):
+        gain = design.controller.position_loop.gain
+        return lambda off: off + np.gradient(off, period_s) / gain
+    turned = np.pi * np.arange(count + 1) / count  # lines of the motion to and back
+    inverse = 1.0 / response_of(design)(turned / period_s)
+    return lambda off: np.asarray(irfft(inverse * rfft(np.append(off, off[::-1])))[:count])
 
 
 def response_of(design: Design) -> Callable[[Floats], Complexes]:

@@ -63,7 +63,8 @@ def test_a_report_with_its_validation_has_the_same_bytes_twice(name: str, tmp_pa
     for seed in ("1", "2"):
         words = ("-c", REPORT, "report", name, "--quiet", "--out", str(tmp_path / seed))
         said = ran(*words, SOURCE_DATE_EPOCH="1700000000", PYTHONHASHSEED=seed).decode()
-        assert not PLOTTING & set(said.splitlines()[-1].split())
+        unused = PLOTTING - {"jinja2", "scipy.optimize"}  # a page takes templates and a search
+        assert not unused & set(said.splitlines()[-1].split())
         made.append([(tmp_path / seed / file).read_bytes() for file in ("report.html", "report.json")])
     assert made[0] == made[1]
     assert b"Predictions against simulation" in made[0][0]

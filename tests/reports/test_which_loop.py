@@ -21,7 +21,7 @@ from analyses.isolation import isolated
 from analyses.large_signal.from_rest import sweep_from_rest
 from analyses.large_signal.map import amplitude_map
 from analyses.linear.loop_figures import all_loop_figures
-from analyses.linear.responses import answer_curve, response_at
+from analyses.linear.responses import response_at, response_curve
 from analyses.specification.requirements import RequirementVerdict, evaluate_requirements
 from nonlinear import commands, simulate
 from reports.sections.requirements import label
@@ -45,7 +45,7 @@ def test_the_ball_screw_follows_its_command_to_5_6_hz_its_reference_to_115() -> 
     """Simulated small sines: -2.37 dB at 5 Hz, -12.7 dB at 20 Hz; the profile alone is -3 dB at 5.5 Hz."""
     smooth = replace(SCREW, friction=replace(SCREW.friction, load_coefficient=0.0))
     figures = all_loop_figures(assemble_loops(smooth), step=False)["position"]
-    db = answer_curve(figures, 2.0 * np.pi * np.array([5.0, 20.0])).magnitude_db
+    db = response_curve(figures, 2.0 * np.pi * np.array([5.0, 20.0])).magnitude_db
     assert tuple(db) == (pytest.approx(-2.37, abs=0.01), pytest.approx(-12.7, abs=0.05))
     to_command, to_reference = judged(SCREW, to="command"), judged(SCREW, to="reference")
     assert to_command.value == judged(SCREW).value == pytest.approx(5.62, abs=0.01)
