@@ -17,6 +17,9 @@ from actuator_lti.errors import InputError
 from actuator_lti.files.reading import Tree
 
 MARK = "@@changed@@"
+_LINES = re.compile(
+    r'"""(?:\\.|.)*?"""|\'\'\'.*?\'\'\'', re.S
+)  # texts of several lines: no heads stand in them
 Patch = tuple[int, int, str, str]
 """What a changed value replaces: the characters from, to; what stands before it, and behind."""
 
@@ -50,38 +53,42 @@ def _written_anew(text: str, keys: Sequence[Tree], places: Sequence[Patch]) -> s
 
 
 def _patches(design: Design, keys: Sequence[Tree], text: str) -> list[Patch]:
-    tables, parsed = _tables(text), cache(lambda part: pickle.dumps(tomlkit.parse(part)))
+    bare = _LINES.sub(lambda lines: " " * len(lines[0]), text)
+    tables, parsed = _tables(bare), cache(lambda part: pickle.dumps(tomlkit.parse(part)))
     places = [(key["path"], *tables.get(key["path"].split(".")[0], (0, len(text)))) for key in keys]
     # each key changes a copy, of its own tables alone
     return [
-        _patch(design, path, text, start, stop, pickle.loads(parsed(text[start:stop])))
+        _patch(design, path, text[start:stop], start, bare, pickle.loads(parsed(text[start:stop])))
         for path, start, stop in places
     ]
 
 
-def _tables(text: str) -> dict[str, tuple[int, int]]:
+def _tables(bare: str) -> dict[str, tuple[int, int]]:
     """From where to where the tables of each first name stand, unless entries stand before all of them."""
-    heads = [(head[1], head.start()) for head in re.finditer(r"(?m)^\[\[?\s*([A-Za-z][\w-]*)", text)]
+    heads = [(head[1], head.start()) for head in re.finditer(r"(?m)^\[\[?\s*([A-Za-z][\w-]*)", bare)]
     found: dict[str, tuple[int, int]] = {}
-    if re.search(r"(?m)^[^#\n]*=", text[: heads[0][1]] if heads else text):
+    if re.search(r"(?m)^[^#\n]*=", bare[: heads[0][1]] if heads else bare):
         return found
-    for (name, start), (_, stop) in pairwise([*heads, ("", len(text))]):
+    for (name, start), (_, stop) in pairwise([*heads, ("", len(bare))]):
         found[name] = (found.get(name, (start,))[0], stop)
     return found
 
 
-def _patch(design: Design, path: str, text: str, start: int, stop: int, tree: tomlkit.TOMLDocument) -> Patch:
-    """Give the lines in which a text differs from that with a key changed, the latter cut at the value."""
+def _patch(design: Design, path: str, part: str, start: int, bare: str, tree: tomlkit.TOMLDocument) -> Patch:
+    """Give the lines in which a part differs from that with a key changed, the latter cut at the value.
+
+    ``bare``: the whole text, in which heads are looked for.
+    """
     override(tree, path, MARK, design)
-    old, new = (each.splitlines(keepends=True) for each in (text[start:stop], tomlkit.dumps(tree)))
+    old, new = (each.splitlines(keepends=True) for each in (part, tomlkit.dumps(tree)))
     edits = [one for one in SequenceMatcher(None, old, new, False).get_opcodes() if one[0] != "equal"]
     (_, first, _, begins, _), (_, _, last, _, ends) = edits[0], edits[-1]
     begin, end = (start + sum(map(len, old[:line])) for line in (first, last))
     before, _, after = "".join(new[begins:ends]).partition(f'"{MARK}"')
     table, _, key = path.rpartition(".")
-    if begin == end and (head := re.search(rf"(?m)^\[{re.escape(table)}\].*\n", text)):  # a key that is new
+    if begin == end and (head := re.search(rf"(?m)^\[{re.escape(table)}\].*\n", bare)):  # a key that is new
         return head.end(), head.end(), f"{key} = ", "\n"
     if begin == end and "[" in before:  # in a table that is not there: with its whole path before all others
-        begin = end = len(re.split(r"(?m)^\[", text)[0])
+        begin = end = len(re.split(r"(?m)^\[", bare)[0])
         before = f"{path} = "
     return begin, end, before, after

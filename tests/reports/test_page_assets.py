@@ -151,9 +151,13 @@ def changed(text: str, keys: list[Tree], places: list[tuple[int, int, str, str]]
     return made + text[last:]
 
 
-@pytest.mark.parametrize("name", [*shipped_designs(), "mine"])
+LINES = re.sub(r"(?m)^title = .*$", 'title = """A joint\n[arm] of a robot"""', design_text("joint"))
+OWN = {"mine": OTHER, "lines": LINES}
+
+
+@pytest.mark.parametrize("name", [*shipped_designs(), *OWN])
 def test_only_the_entry_of_a_changed_key_is_written_anew(name: str) -> None:
-    source = OTHER if name == "mine" else design_text(name)
+    source = OWN.get(name) or design_text(name)
     design = read_design_text(source, name)
     keys = followed(design).free
     text, places = patches(design, keys, source)
