@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from actuator_lti.systems.delay_system import DelaySystem
 
 PlantInput = Literal["u", "i_ref"]
-INPUTS = ("ref", "load_torque")  # behind ``command`` and ``load_torque``
+INPUTS = ("ref", "load_torque")  # the first by the name of the command
 OUTPUTS = {"current": "i", "speed": "w", "angle": "th", "output_angle": "output_angle", "twist": "twist",
            "output_speed": "output_speed"}  # fmt: skip
 
@@ -79,7 +79,7 @@ def _names(signals: dict[str, Any], command: str) -> tuple[list[str], dict[str, 
     """The signals behind the outputs that there are, and the names for python-control."""
     present = {label: signal for label, signal in OUTPUTS.items() if signal in signals}
     return list(present.values()), {
-        "inputs": [command, "load_torque"], "outputs": list(present), "name": "plant",
+        "inputs": [command, *INPUTS[1:]], "outputs": list(present), "name": "plant",
     }  # fmt: skip
 
 

@@ -42,7 +42,7 @@ class DelayResponse:
     @classmethod
     def of(cls, form: DelayForm) -> DelayResponse:
         loop, *others = exact_inside_delays(form, reduced=False)
-        N, D = (_known(loop.N, [other.N for other in others]), _known(loop.D, [other.D for other in others]))
+        N, D = _known(loop.N, [other.N for other in others]), _known(loop.D, [other.D for other in others])
         return cls(replace(loop, N=N, D=D))
 
     def behind_mean(self, samples: int, period_s: float) -> DelayResponse:

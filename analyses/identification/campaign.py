@@ -161,8 +161,8 @@ def check_run(
     least = (design.effective_motor.torque_constant_Nm_A or 0.0) * tools.current_offset_A
     least += SURE * float(np.sqrt(point.covariance[0, 0]))
     if point.torque_Nm < -least and (design.load.path == "self-locking" or not point.load_Nm):
-        why = f"{point.torque_Nm:.4g} N m with the motion, where friction alone acts against it"
-        text = f"the sign of the current is turned, or that of the speed: kM i is {why}"
+        torque = f"{point.torque_Nm:.4g} N m with the motion, where friction alone acts against it"
+        text = f"the sign of the current is turned, or that of the speed: kM i is {torque}"
         yield Finding(subject="current against the motion", passed=False, text=text)
     yield from check_record(design, run.record)
     for other in imported.runs:

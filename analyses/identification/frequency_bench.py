@@ -102,14 +102,14 @@ def identify_frequency(
     findings = {one.name: check_record(design, one) for one in (record, play_record) if one is not None}
     items = [verdict.inputs_item(name, result) for name, result in findings.items()]
     why = "play, friction or another resonance: excite on one flank, in motion"
-    origin = f"misfit {fit.misfit:.2f} of its noise, {MISFIT_LIMIT:g} allowed"
-    label = f"The two-mass model explains the lines ({origin})"
+    misfit = f"misfit {fit.misfit:.2f} of its noise, {MISFIT_LIMIT:g} allowed"
+    label = f"The two-mass model explains the lines ({misfit})"
     items.append(Item.of("misfit", label, "" if fit.misfit <= MISFIT_LIMIT else why))
     items += verdict.kept_items(fit, held)
     if play is not None:
         dry = (design.load.friction or LoadFriction()).dry_torque_Nm
-        origin = f"the play is that at the design's load.friction.dry_torque, {dry:g} N m; more adds to it"
-        items.append(Item.unproven("kept-load_dry", "Dry friction of the load", origin))
+        why = f"the play is that at the design's load.friction.dry_torque, {dry:g} N m; more adds to it"
+        items.append(Item.unproven("kept-load_dry", "Dry friction of the load", why))
     items.append(_written_item(read_design_text(write_design(made)), lines, record.name, fit.reaction))
     return FrequencyResult(
         record=record,

@@ -205,8 +205,8 @@ class Sought:
         parts = []
         for part, record in zip(model.records, records, strict=True):
             command = command_of(start, record)
-            why = "command of the simulated drive" + f", {record.between}" * (record.between != SMOOTH)
-            more = {} if command is None else {command.signal: why}
+            origin = "command of the simulated drive" + f", {record.between}" * (record.between != SMOOTH)
+            more = {} if command is None else {command.signal: origin}
             parts.append(replace(part, used={**more, **part.used}))
 
         def made(model: JointModel) -> Design:

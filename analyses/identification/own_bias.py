@@ -10,7 +10,7 @@ from scipy.fft import irfft, rfft
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError, NumericalError
 from actuator_lti.loops import assemble_loops
-from actuator_lti.types import Complexes, Floats
+from actuator_lti.types import Floats
 from analyses.correlation.closed_loop import AXIS_SIGNALS, model_signals
 from analyses.correlation.driving import command_of
 from analyses.estimation.fit import Fit
@@ -30,7 +30,7 @@ from analyses.records.record import SMOOTH, Record
 from analyses.records.single_rows import ROUNDING, count_of
 
 LARGEST_BIAS = 0.2
-COMMAND_ROUNDS = 12
+ROUNDS_BY_LOOPS, ROUNDS_BY_GAIN = 12, 6
 ROUNDS = 3
 PLACES = {"angle", "output_angle", "position"}
 SETTLED = 0.1  # standard errors within which a bias that was found again is the one that was found before
@@ -69,8 +69,8 @@ def without_bias(
             again = fit([one.without({"output_angle"} - part.used.keys()) for one, part in pairs])
         except (InputError, NumericalError) as error:
             return replace(less, bias_note=f"not taken off: {error}")
-        made_of = _corrected(start, made, model, again, learnt=bool(lacking), roughly=roughly)
-        before, less = less, replace(made_of, simulated=less.simulated)
+        found = _corrected(start, made, model, again, learnt=bool(lacking) and not roughly, roughly=roughly)
+        before, less = less, replace(found, simulated=less.simulated)
         if not less.bias or np.all(np.abs(less.values - before.values) < SETTLED * less.standard_errors):
             break
     return less
@@ -116,7 +116,7 @@ def _corrected(
         bias=dict(zip(model.names, bias.tolist(), strict=True)),
         bias_note="found on records simulated with the result, and taken off",
     )
-    less = less.wider(_not_shared(model, again) * bias) if learnt and not roughly else less
+    less = less.wider(_not_shared(model, again) * bias) if learnt else less
     return with_scatter(start, less.wider(_by_direction(model, again)))
 
 
@@ -209,8 +209,9 @@ def _cannot(design: Design, records: Sequence[Record]) -> str:
 def _driven(design: Design, record: Record) -> Record:
     """The record, or its first part; without a command it gets one that moves the drive as recorded.
 
-    It is learnt: what the simulated motion lacks is added over the response of the loops, as long as it comes
-    nearer where that is exact.
+    It is learnt: what the simulated motion lacks is added over the response of the linear loops, as long as
+    it comes nearer; where none holds what it asks for between the rows, over gain/(s + gain), about the
+    position loop, which asks for less where a drive sticks.
     """
     record = simulated_part(design, record)
     if command_of(design, record) is not None:
@@ -221,15 +222,17 @@ def _driven(design: Design, record: Record) -> Record:
         return motion_of(design, record, recipe_for(record))[0].position
 
     wanted = command = place(record)
-    step, exact = _step_of(design, record, len(wanted)), holds_between(design, record)
+    holds = holds_between(design, record)
+    step = (_by_loops if holds else _by_gain)(design, record.period_s, len(wanted))
     driven, nearest = record, np.inf
-    for _ in range(COMMAND_ROUNDS if exact else COMMAND_ROUNDS // 2):
+    for _ in range(ROUNDS_BY_LOOPS if holds else ROUNDS_BY_GAIN):
         signals = {**record.signals, name: command / design.total_ratio}
         tried = replace(record, signals=signals, between=record.between or SMOOTH)
         off = wanted - place(with_model_signals(design, tried))
-        if exact and not (size := float(off @ off)) < nearest:
+        size = float(off @ off)
+        if holds and not size < nearest:
             break
-        driven, nearest = tried, size if exact else np.inf
+        driven, nearest = tried, size
         command = command + step(off)
     return driven
 
@@ -240,26 +243,17 @@ def holds_between(design: Design, record: Record) -> bool:
     return position is not None and position.every > 1 and record.period_s > 1.5 * tick_s
 
 
-def _step_of(design: Design, record: Record, count: int) -> Callable[[Floats], Floats]:
-    """What is added to a command for what the motion lacks.
-
-    Over the response of the linear loops; where none holds what it asks for between the rows, over
-    gain/(s + gain), about the position loop, which asks for less where a drive sticks.
-    """
-    period_s = record.period_s
-    if not holds_between(design, record):
-        gain = design.controller.position_loop.gain
-        return lambda off: off + np.gradient(off, period_s) / gain
-    turned = np.pi * np.arange(count + 1) / count  # lines of the motion to and back
-    inverse = 1.0 / response_of(design)(turned / period_s)
-    return lambda off: np.asarray(irfft(inverse * rfft(np.append(off, off[::-1])))[:count])
+def _by_gain(design: Design, period_s: float, count: int) -> Callable[[Floats], Floats]:
+    gain = design.controller.position_loop.gain
+    return lambda off: off + np.gradient(off, period_s) / gain
 
 
-def response_of(design: Design) -> Callable[[Floats], Complexes]:
-    """The output over its command at angular frequencies, rad/s, by the linear loops."""
+def _by_loops(design: Design, period_s: float, count: int) -> Callable[[Floats], Floats]:
     response = assemble_loops(design).plain_response
     assert response is not None  # the rotor is free
-    return lambda omega_rad_s: np.asarray(response(np.exp(1j * omega_rad_s * response.dt)))
+    turned = np.pi * np.arange(count + 1) / count  # lines of the motion to and back
+    inverse = 1.0 / np.asarray(response(np.exp(1j * turned / period_s * response.dt)))
+    return lambda off: np.asarray(irfft(inverse * rfft(np.append(off, off[::-1])))[:count])
 
 
 def with_model_signals(design: Design, record: Record) -> Record:

@@ -93,9 +93,9 @@ def drive_of(design: Design, record: Record) -> tuple[Floats, str, str, bool]:
         if name in signals and constant is not None and ohm is not None:
             origin = f"kM (u - kE w)/R of the {words}, without the inductance"
             return np.asarray(constant / ohm * record[name]), name, origin, True
-    origin = "no drive signal: force, current (kM), torque_reference, or voltage (a source gain, or kM and R)"
-    origin += "; of a motor that is switched off a column of current 0"
-    raise lacking(record, origin)
+    why = "no drive signal: force, current (kM), torque_reference, or voltage (a source gain, or kM and R)"
+    why += "; of a motor that is switched off a column of current 0"
+    raise lacking(record, why)
 
 
 def motion_of(design: Design, record: Record, recipe: Recipe) -> tuple[Motion, str]:

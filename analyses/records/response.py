@@ -224,8 +224,8 @@ def _response(columns: Mapping[str, Floats], name: str, averages: int | None) ->
     units = {role: column.unit_of(role, own, table[role]) for role, own in found.items()}
     f = table["frequency"] * column.si_of("frequency", units["frequency"])
     if f.size < 2 or not (f > 0.0).all():
-        read_as = f"{f.size} rows of numbers, frequencies above 0 in {(f > 0.0).sum()}"
-        raise InputError(f"{read_as}; allowed: two rows or more, each at a frequency above 0 Hz")
+        why = f"{f.size} rows of numbers, frequencies above 0 in {(f > 0.0).sum()}"
+        raise InputError(f"{why}; allowed: two rows or more, each at a frequency above 0 Hz")
     z, coherence = column.complex_values(table, units), table.get("coherence", np.full(f.size, np.nan))
     if (odd := coherence[(coherence < 0.0) | (coherence > 1.0)]).size:
         per_cent = ", a ratio and not per cent" * bool((coherence[coherence > 1.0] <= 100.0).any())

@@ -187,8 +187,8 @@ def noise_of(
     if (n < 2.0).any():
         raise InputError("averages: at least 2")
     deviation = np.sqrt((1.0 - coherence) / (coherence * (n - 1.0)))
-    why = f"coherence of {n.min():g} averages{' or more' if n.min() < n.max() else ''}"
-    return deviation, deviation * student(n - 1.0, CONFIDENCE), why if np.isfinite(n).all() else ""
+    source = f"coherence of {n.min():g} averages{' or more' if n.min() < n.max() else ''}"
+    return deviation, deviation * student(n - 1.0, CONFIDENCE), source if np.isfinite(n).all() else ""
 
 
 def _deviation(table: Mapping[str, Floats], units: Mapping[str, str]) -> Floats:

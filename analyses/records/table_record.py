@@ -139,8 +139,8 @@ def record_of_columns(vectors: Mapping[str, Floats], spec: RecordSpec, path: Pat
         if infinite.any():
             raise InputError(f'"{name}": not finite', where=f"{path}, row:{infinite.argmax() + 1}")
     if len(set(map(len, columns))) > 1:
-        why = ", ".join(f"{name} {len(column)}" for name, column in zip(names, columns, strict=True))
-        raise InputError(f"the vectors differ in length: {why}", where=str(path))
+        lengths = ", ".join(f"{name} {len(column)}" for name, column in zip(names, columns, strict=True))
+        raise InputError(f"the vectors differ in length: {lengths}", where=str(path))
     table = np.column_stack(columns)
     counts = RowCounts(rows_in=len(table), columns=header)
     block = Block(values=table, lines=np.arange(1, len(table) + 1))
