@@ -151,7 +151,9 @@ def changed(text: str, keys: list[Tree], places: list[tuple[int, int, str, str]]
     return made + text[last:]
 
 
-LINES = re.sub(r"(?m)^title = .*$", 'title = """A joint\n[arm] of a robot"""', design_text("joint"))
+LINES = design_text("joint").replace(
+    '"8 1/s", source = "tuned here"', '"8 1/s", source = """tuned\n[here]"""'
+)
 OWN = {"mine": OTHER, "lines": LINES}
 
 
