@@ -1,6 +1,6 @@
 """Margins by exact arithmetic on the given doubles: certified, or withheld with the reason.
 
-What the data determine is the answer that is the same for neighbours 8 ulp away.
+What the data determine is the verdict that is the same for neighbours 8 ulp away.
 """
 
 import math
@@ -13,7 +13,7 @@ from actuator_lti.errors import InputError
 from actuator_lti.margins.assemble import Figures, assembled
 from actuator_lti.margins.distances import DISK, MODULUS
 from actuator_lti.margins.exact.crossings import crossings, smallest
-from actuator_lti.margins.exact.decided import ACROSS, UNRESOLVED, Shared, hidden_notes, shared
+from actuator_lti.margins.exact.decided import ACROSS, UNRESOLVED, Shared, hidden_notes, settled
 from actuator_lti.margins.exact.loop import ExactLoop, exact_loop, neighbours
 from actuator_lti.margins.exact.roots import within
 from actuator_lti.margins.given import ULP, Given
@@ -33,7 +33,8 @@ _MANY = 2.0  # a modulus below which half of the poles lie, where counting shows
 def certified_margins(given: Given, band_rad_s: tuple[float, float] | None = None) -> StabilityMargins:
     """All margins of a rational loop from the exact values of its doubles, see `stability_margins`.
 
-    The answer is given where it is the same for neighbours of the data, each entry 8 ulp away.
+    The verdict is given where it is the same for neighbours of the data, each entry 8 ulp away; a crossing
+    that they do not share is one of the given doubles, and noted.
     """
     loop = exact_loop(given)
     above, below = (loop.N(1), loop.D(1)) if loop.sampled else (loop.N[loop.degree], loop.D[loop.degree])
@@ -41,12 +42,9 @@ def certified_margins(given: Given, band_rad_s: tuple[float, float] | None = Non
         raise InputError("1 + L is zero at infinite frequency: the closed loop is not well posed")
     others = neighbours(given, loop)
     poles, hidden, figures = _poles(given, loop, others), loop.hidden_modes, None
-    found = Shared((), (), problem=poles.problem)
+    found = Shared((), ())
     if poles.problem is None:
-        found = shared(*(crossings(each, loop) for each in (loop, *others)))
-        if found.problem is not None:
-            found = shared(*(crossings(each, loop, merge=True) for each in (loop, *others)))
-    if found.problem is None:
+        found = settled(lambda merge: [crossings(each, loop, merge) for each in (loop, *others)])
         figures = Figures(found.gains, found.reals, [smallest(loop.N, loop.D, d) for d in (MODULUS, DISK)])
     if poles.hidden > hidden.at_zero:  # one that the data do not resolve from a mode at zero
         hidden = replace(hidden, at_zero=poles.hidden)
@@ -60,7 +58,7 @@ def certified_margins(given: Given, band_rad_s: tuple[float, float] | None = Non
         method=_METHOD,
         notes=(*hidden_notes(hidden), *found.notes, *filter(None, (poles.note,))),
         evidence="certified",
-        reason=found.problem or reason,
+        reason=poles.problem or reason,
         band_rad_s=band_rad_s,
         hidden_at_limit=max(loop.hidden_modes.at_limit, poles.hidden) + loop.hidden_at_end,
     )

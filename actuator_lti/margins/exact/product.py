@@ -72,8 +72,6 @@ def late_margins(given: Given, delay_s: float, band: tuple[float, float] | None)
     if any(other != nyquist for _, other, _ in others):
         raise Doubtful(ACROSS)
     common = shared(*((each.gains, each.reals) for each, *_ in (base, *others)))
-    if common.problem is not None:
-        raise Doubtful(common.problem)
     hidden = loop.hidden_modes
     return found.margins(
         Agreement(None if poles is None else poles + hidden.right, nyquist + hidden.right),
