@@ -80,10 +80,13 @@ def identify_campaign(
     The design's torque constant makes torques of currents; ``richer``: whether to ask, by cross-validation,
     for a richer law; ``fixed``: coefficients (C0, Cv, CM) that are held at a value.
 
-    Raises `InputError`: without a torque constant, or with too few usable runs; the reasons of those set
-    aside are told.
+    Raises `InputError`: of a linear axis, without a torque constant, or with too few usable runs; the reasons
+    of those set aside are told.
     """
     design = as_design(design)
+    if design.axis == "linear":  # speeds and loads of its runs are those of a shaft
+        why = "a campaign is of a rotary drive; allowed for a linear axis: records of a motion"
+        raise InputError(f'design.axis = "linear": {why}', design.name)
     constant = design.effective_motor.torque_constant_Nm_A
     if constant is None:
         why = "motor.torque_constant: the design has none, so currents cannot become torques"
