@@ -11,6 +11,7 @@ from actuator_lti.errors import InputError, NumericalError
 from actuator_lti.types import Floats, Progress
 from analyses.estimation.least_squares import scaled_lstsq
 from analyses.estimation.parameters import default_value
+from analyses.identification.asked import refuse_linear
 from analyses.identification.design_values import design_value, kept_constant
 from analyses.identification.points import SteadyPoint, steady_point
 from analyses.identification.richer import RicherLaws, compare_laws
@@ -84,9 +85,7 @@ def identify_campaign(
     of those set aside are told.
     """
     design = as_design(design)
-    if design.axis == "linear":  # speeds and loads of its runs are those of a shaft
-        why = "a campaign is of a rotary drive; allowed for a linear axis: records of a motion"
-        raise InputError(f'design.axis = "linear": {why}', design.name)
+    refuse_linear(design, "a campaign")
     constant = design.effective_motor.torque_constant_Nm_A
     if constant is None:
         why = "motor.torque_constant: the design has none, so currents cannot become torques"
