@@ -217,7 +217,9 @@ def test_a_required_current_is_read_as_limits_read_theirs(text, amperes, quantit
 def test_a_design_is_explained_as_written_as_read_and_as_the_model_has_it(cli) -> None:
     items = {item.path: item for item in explained(SERVO)}
     assert items["motor.torque_constant"].written == "0.93 N*m/A"
-    assert items["motor.torque_constant"].model == f"kM = {0.93 / sqrt(1.5):.9g} N*m/A"
+    assert items["motor.torque_constant"].model == f"kM = {0.93 / sqrt(1.5):.9g} N*m/A dc"
+    axis = {item.path: item for item in explained(load_design("ballscrew"))}
+    assert axis["limits.peak_current"].read == "14.7 A dc"
     assert items["motor.rotor_inertia"].read == "5.9e-05 kg*m^2"
     told = {"written": "5.9 mN*m/A", "read": "0.0059 N*m/A", "model": "kM = 0.0059 N*m/A"}
     asked = cli.data("keys", "torque_constant", "--explain", "ilr33-amber")["keys"]
