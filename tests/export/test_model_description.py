@@ -79,6 +79,8 @@ def test_sizes_and_units_are_those_of_the_data_sheet(name: str, version: int) ->
     for each, (size, *units) in wanted.items():
         about = known[each]
         assert [about["unit"], about.get("displayUnit")] == units, each
+        alternating = name == "ballscrew" and about["unit"] in ("A", "V")
+        assert about["description"].endswith(", of the equivalent DC motor") == alternating
         nominal = float(about["nominal"]) if "nominal" in about else None
         assert nominal == (None if size is None else pytest.approx(size, rel=1e-6)), each
 
