@@ -86,12 +86,12 @@ def amperes_words(design: Design) -> str:
     """What A and V of an AC motor are (docs/model.md, section 1); nothing of a DC motor's.
 
     >>> amperes_words(as_design("ballscrew"))
-    'A, V: of an equivalent DC motor; 1.225 A is 1 A rms, 0.866 A is 1 A peak of a phase, V is peak line-line.'
+    'Of an equivalent DC motor: 1.225 A is 1 A rms, 0.866 A is 1 A peak of a phase, V is peak line-line.'
     """
     if design.motor.constants == "dc":
         return ""
     rms, peak = (f"{DC_PER_A[one]:.4g} A is 1 A" for one in ("rms-line", "peak-phase"))
-    return f"A, V: of an equivalent DC motor; {rms} rms, {peak} peak of a phase, V is peak line-line."
+    return f"Of an equivalent DC motor: {rms} rms, {peak} peak of a phase, V is peak line-line."
 
 
 def stage_words(design: Design) -> tuple[str, str]:
