@@ -7,14 +7,15 @@ import multiprocessing
 import random
 import re
 import sys
-import tempfile
 import tomllib
 import unicodedata
+import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from subprocess import CompletedProcess, TimeoutExpired
+from tempfile import TemporaryDirectory, TemporaryFile
 from types import ModuleType
 from typing import IO, Any
 from unittest import mock
@@ -153,7 +154,7 @@ def mat(read: Callable[[Path], object]) -> Callable[[Path], None]:
 
 
 def forked(*, input: bytes, timeout: float, args: Any, **_: object) -> CompletedProcess[bytes]:
-    with tempfile.TemporaryFile() as out, tempfile.TemporaryFile() as err:
+    with TemporaryFile() as out, TemporaryFile() as err, warnings.catch_warnings(action="ignore"):  # of threads
         process = multiprocessing.get_context("fork").Process(target=mat_reader, args=(input, out, err))
         process.start()
         process.join(timeout)
@@ -327,14 +328,12 @@ def parquet_file() -> bytes:
 
 @cache
 def history_files() -> dict[str, bytes]:
-    import tempfile
-
     from nightly_fakes import CODE, INLINE, job
     from nightly_fakes import study as of
 
     from reports.nightly.night import run_night
 
-    with tempfile.TemporaryDirectory() as folder:
+    with TemporaryDirectory() as folder:
         for margin in (10.0, 11.0):
             run_night(of(job("a", margin), job("b")), Path(folder) / "s", INLINE, code=CODE)
         return {path.name: path.read_bytes() for path in (Path(folder) / "s.state").rglob("*.json")}
