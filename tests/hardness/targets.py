@@ -154,7 +154,11 @@ def mat(read: Callable[[Path], object]) -> Callable[[Path], None]:
 
 
 def forked(*, input: bytes, timeout: float, args: Any, **_: object) -> CompletedProcess[bytes]:
-    with TemporaryFile() as out, TemporaryFile() as err, warnings.catch_warnings(action="ignore"):  # of threads
+    with (
+        TemporaryFile() as out,
+        TemporaryFile() as err,
+        warnings.catch_warnings(action="ignore"),
+    ):  # of threads
         process = multiprocessing.get_context("fork").Process(target=mat_reader, args=(input, out, err))
         process.start()
         process.join(timeout)
