@@ -58,8 +58,8 @@ $(ALL): $(CORE) requirements-all.lock
 	@$(LOCKED) --requirement requirements-all.lock
 	@touch $@
 
-# The tests of margins, loops, studies and reports again, as on processors with other linear algebra: its kernels
-# that run here but the one that all tests run on, and ten processors that are not at hand (tests/machines/beside.py).
+# The tests of margins, loops, studies and reports again, as on ten processors that are not at hand (beside.py in
+# tests/machines), each with one of the kernels of linear algebra that run here but the one that all tests run on.
 MACHINE_TESTS := tests/margins/test_margin_reference_loops.py tests/margins/test_margin_edges.py \
   tests/margins/test_unstable_inner_loops.py \
   tests/margins/test_delay_margins.py tests/margins/test_step_random.py \
@@ -70,8 +70,7 @@ AS_MACHINE := $(BIN)/python -m pytest -q -p no:cacheprovider -m "not slow" $(MAC
 
 # Two machines at once.
 machines: $(ALL)
-	@set -e; kernels=$$($(BIN)/python tests/machines/machine_kinds.py); \
-	printf '%s\n' $$kernels $(PROCESSORS:%=OTHER_PROCESSOR=%) | \
+	@set -e; machines="$$($(BIN)/python tests/machines/machine_kinds.py $(PROCESSORS))"; echo "$$machines" | \
 	  xargs -P 2 -I MACHINE sh -c 'env MACHINE $(AS_MACHINE) && echo "as MACHINE: passed" || { echo "as MACHINE: FAILED"; exit 1; }'
 
 # The page's scripts: types, rules, and their pure parts by node's own runner.

@@ -35,14 +35,14 @@ class StabilityMargins:
 
     How an answer is known (``evidence``):
 
-    - ``"certified"``: by exact arithmetic on the given doubles and roots in certified intervals; the same
-      for data 8 ulp away.
+    - ``"certified"``: by exact arithmetic on the given doubles and roots in certified intervals; the
+      verdict is the same for data 8 ulp away, and a note names a crossing that is not.
     - ``"checked"``: in double precision; poles and Nyquist count agree, the parity of the crossovers is
       right, no pole lies within its own error of the stability boundary, and each figure has a small bound
       of its error; behind a delay also from the zeros and poles of the exact polynomials, if rounding of
       the entries (8 ulp) changes nothing.
-    - ``"withheld"``: verdict or crossings are not resolved in double precision (8 ulp of the entries change
-      them), or a search came to its end. The reason says which.
+    - ``"withheld"``: the verdict is not resolved in double precision (8 ulp of the entries change it), or a
+      search came to its end. The reason says which.
 
     ``stable``: whether the closed loop is stable; a pole on the stability boundary is not stable.
     ``verdict``: "stable", "unstable", "at the stability limit" or "undecided".

@@ -158,10 +158,11 @@ def stride(p, s, number, h):
 
 
 def put_state(p, s, i, w, W, d, turned):
-    """Write the state; the load's angle is what the motor's angle and the twist leave, or stays at rest."""
+    """Write the state; the load's angle is what the motor's angle and the twist leave, or as it was."""
+    stands = W == 0.0 and s[at.ES_LOAD_SPEED] == 0.0
     s[layout.S_CURRENT], s[layout.S_SPEED], s[at.ES_LOAD_SPEED], s[at.ES_TWIST] = i, w, W, d
     s[layout.S_ANGLE] += turned
-    if s[at.ES_LOAD] != 0.0:
+    if not stands:
         s[at.ES_LOAD_ANGLE] = s[layout.S_ANGLE] / p[layout.RATIO_TO_COUPLING] - d
     modes.put_output(p, s)
 

@@ -83,6 +83,7 @@ def _signal(design: Design, number: int, text: tuple[str, str, str], **more: Any
     """An input or output: name, words and unit, with its size where that is known."""
     name, words, unit = text
     size = sizes(design)[name]
+    words += ", of the equivalent DC motor" * (unit in ("A", "V") and design.motor.constants != "dc")
     turns = unit == "rad/s" and name in ("motor.speed", "control.speed_command")
     return Variable(
         name=name, reference=number, variability="continuous", description=words, unit=unit,

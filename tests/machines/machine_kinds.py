@@ -1,10 +1,13 @@
 """Which kinds of machine this one can act as: environment variables by name; as a script, for the makefile.
 
 A kernel for instructions that the processor does not have would end the process: it is left out.
+``python machine_kinds.py SEED ...`` prints a machine for each seed, of a processor that is not at hand
+(`beside`): its products are those of one of the kernels that run here, but for the one of all tests, in turn.
 """
 
 import os
 import sys
+from itertools import cycle
 
 from numpy._core._multiarray_umath import __cpu_dispatch__, __cpu_features__
 
@@ -35,6 +38,13 @@ def kinds() -> dict[str, dict[str, str]]:
     return result
 
 
-if __name__ == "__main__":
+def machines(seeds: list[str]) -> list[str]:
+    """A line of environment variables for each machine; every kernel once where the seeds are fewer."""
     of_all_tests = {**same_order(), **os.environ}.get("OPENBLAS_CORETYPE")
-    sys.stdout.write("".join(f"OPENBLAS_CORETYPE={name}\n" for name in kernels() if name != of_all_tests))
+    others = [f"OPENBLAS_CORETYPE={name} " for name in kernels() if name != of_all_tests] or [""]
+    seeds += [""] * (len(others) - len(seeds))
+    return [f"{kernel}OTHER_PROCESSOR={seed}" for kernel, seed in zip(cycle(others), seeds, strict=False)]
+
+
+if __name__ == "__main__":
+    sys.stdout.write("\n".join([*machines(sys.argv[1:]), ""]))

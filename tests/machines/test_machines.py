@@ -74,12 +74,15 @@ def test_there_are_several_kinds() -> None:
         assert len(kernels()) >= 1
 
 
-def test_the_kernel_that_all_tests_run_on_is_not_asked_again() -> None:
+def test_every_kernel_is_asked_but_that_of_all_tests_and_every_seed() -> None:
     """It was, and that of a processor's own, with which nobody settles the order, was asked never."""
-    command = [sys.executable, str(SCRIPT.with_name("machine_kinds.py"))]
-    listed = subprocess.run(command, env=unasked(), capture_output=True, text=True, check=True).stdout
-    others = [name for name in kernels() if name != same_order().get("OPENBLAS_CORETYPE")]
-    assert listed.split() == [f"OPENBLAS_CORETYPE={name}" for name in others]
+    others = {name for name in kernels() if name != same_order().get("OPENBLAS_CORETYPE")}
+    for seeds in ([], ["1"], ["1", "2", "3"]):
+        command = [sys.executable, str(SCRIPT.with_name("machine_kinds.py")), *seeds]
+        listed = subprocess.run(command, env=unasked(), capture_output=True, text=True, check=True).stdout
+        each = [dict(word.split("=") for word in line.split()) for line in listed.splitlines()]
+        assert {one.get("OPENBLAS_CORETYPE") for one in each} - {None} == others
+        assert [one["OTHER_PROCESSOR"] for one in each][: len(seeds)] == seeds
 
 
 @pytest.mark.parametrize("seed", range(3))

@@ -142,6 +142,11 @@ def leaves_out(m: StabilityMargins) -> bool:
     return any("left out" in note for note in m.notes)
 
 
+def as_given(m: StabilityMargins) -> bool:
+    """Whether a note says that a crossing is that of the given doubles alone: another form has others."""
+    return any("listed as given" in note for note in m.notes)
+
+
 def too_far(m: StabilityMargins, end: float = math.inf) -> str:
     """The smallest distance to -1 if a crossing below ``end`` lies nearer: |1 + L| there in closed form."""
     phases = [2.0 * math.sin(0.5 * math.radians(abs(p.deg))) for p in m.phase_margins]
@@ -265,7 +270,9 @@ def tried(family: Family, seed: int, k: int) -> tuple[str, str]:
             theirs = Facts(theirs.unstable, gains, phases)
             checked = [one.evidence == "checked" for one in (m, other)]
             tight = (RATIO, DEG) if all(checked) else (1e-8, 1e-6) if any(checked) else (1e-6, 1e-3)
-            if not other.withheld and (what := unlike(ours, theirs, *tight, far=30.0) or farther(m, other)):
+            if not (other.withheld or as_given(m) or as_given(other)) and (
+                what := unlike(ours, theirs, *tight, far=30.0) or farther(m, other)
+            ):
                 return "wrong", f"{name}: {what}"
         if isinstance(loop, control.TransferFunction) and rng.random() < 0.5:
             for name, a, b, far in delayed_forms(loop, rng):

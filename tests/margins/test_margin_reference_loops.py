@@ -7,7 +7,7 @@ import control
 import numpy as np
 import pytest
 from margin_families import sampled_slowly_moving
-from margin_truth import facts, truth_of, unlike
+from margin_truth import facts, moved, truth_of, unlike
 
 from actuator_lti.margins import stability_margins
 from tests.refusals import refused
@@ -123,15 +123,28 @@ def test_certify_is_certified_and_says_so() -> None:
 def test_what_8_ulp_decide_is_withheld() -> None:
     # a fourfold pole near z = 1: rounding of the coefficients scatters it by 1e-4
     den = np.poly([1 - 1e-4] * 4)
-    m = stability_margins(control.tf([1e-14], den, PERIOD_S))
+    m = stability_margins(control.tf([1e-15], den, PERIOD_S))
     assert m.evidence == "withheld"
     assert "not resolved in double precision" in m.evidence_reason
     assert (m.stable, m.verdict) == (None, "undecided")
     assert (m.gain_margin_db, m.phase_margin_deg, m.delay_margin_s, m.modulus_margin) == (None,) * 4
     assert "evidence: withheld" in str(m)
-    late = stability_margins(control.tf([1e-14], den, PERIOD_S), delay_s=0.3 * PERIOD_S)
+    limit = stability_margins(control.tf([1.0], [1.0, -0.5], PERIOD_S), delay_s=0.3 * PERIOD_S).gain_margins[
+        0
+    ]
+    late = stability_margins(control.tf([limit.ratio], [1.0, -0.5], PERIOD_S), delay_s=0.3 * PERIOD_S)
     assert late.evidence == "withheld"
     assert "not resolved in double precision" in late.evidence_reason
+
+
+def test_a_crossing_that_8_ulp_decide_is_that_of_the_doubles_and_noted() -> None:
+    loop = control.tf([1e-14], np.poly([1 - 1e-4] * 4), PERIOD_S)
+    m, near = stability_margins(loop), [moved(loop, np.random.default_rng(k)) for k in range(30)]
+    assert m.verdict == "unstable"
+    assert all(truth_of(other).unstable for other in near)
+    assert len({0.0 in dict(truth_of(other).gains) for other in near}) == 2  # the sign of L(0) is not told
+    assert any("whether L meets the real axis at w = 0 of the s-plane; listed as given" in n for n in m.notes)
+    assert unlike(facts(m), truth_of(loop), 1e-6, 1e-3, far=30.0) is None
 
 
 def test_a_direct_feed_through_next_to_minus_one_is_well_posed_until_the_data_cannot_tell() -> None:

@@ -9,7 +9,7 @@ from actuator_lti.margins.assemble import FARTHEST, Crossing, Figures, assembled
 from actuator_lti.margins.delays.axis import IMAGINARY, NOWHERE, Axis, Form, smallest, turn, zeros
 from actuator_lti.margins.delays.exact import ExactDelayLoop
 from actuator_lti.margins.distances import DISK, MODULUS, Distance, Place
-from actuator_lti.margins.exact.decided import ACROSS, Crossings, Shared, hidden_notes, shared
+from actuator_lti.margins.exact.decided import ACROSS, Crossings, Shared, hidden_notes, settled
 from actuator_lti.margins.results import StabilityMargins
 from actuator_lti.margins.single import Agreement
 from actuator_lti.margins.tail import listed, tail_note
@@ -21,7 +21,7 @@ _FLOOR = 0.01  # gain: margins are listed up to where L stays below
 _BELOW = 1.0 - 1e-12
 _AT_REST = 1e-3  # how far L has moved from its value at rest where a crossover is one of its own
 _METHOD = "zeros of real functions of the axis, parted by intervals in certified arithmetic"
-_REASON = "certified intervals on the exact delays; rounding of the entries changes nothing"
+_REASON = "certified intervals on the exact delays"
 
 
 def certified_delayed_margins(
@@ -38,12 +38,11 @@ def certified_delayed_margins(
     with ctx.workprec(_BITS):
         axes = [Axis(loop) for loop in loops]
         counts = [_unstable(axis) for axis in axes]
-        found, figures = Shared((), (), problem=ACROSS), None
+        found, figures = Shared((), ()), None
         lists = [_reals(axis, band) for axis in axes]
-        for merge in (False, True) if len(set(counts)) == 1 else ():
-            if found.problem is not None:
-                found = shared(*((_gains(a, merge), each[0]) for a, each in zip(axes, lists, strict=True)))
-        if found.problem is None:
+        if len(set(counts)) == 1:
+            reals = [each[0] for each in lists]
+            found = settled(lambda merge: [(_gains(a, merge), r) for a, r in zip(axes, reals, strict=True)])
             near = [smallest(axes[0], d, _known(d, found.reals, start)) for d in (MODULUS, DISK)]
             figures = Figures(found.gains, found.reals, near)
     hidden, (_, listed_to, gain) = loops[0].hidden, lists[0]
@@ -56,7 +55,7 @@ def certified_delayed_margins(
         method=_METHOD,
         notes=(*hidden_notes(hidden), *found.notes, *(tail_note(listed_to, gain) if band is None else ())),
         evidence="certified",
-        reason=found.problem or _REASON,
+        reason=f"{_REASON}; {found.moved_text}" if figures else ACROSS,
         delay_s=delay_s,
         listed_to=listed_to,
         band_rad_s=band,

@@ -2,6 +2,7 @@
 
 import math
 from bisect import bisect_left
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import islice, takewhile
 from operator import attrgetter
@@ -11,6 +12,7 @@ from actuator_lti.margins.exact.roots import HalfPlanes
 
 UNRESOLVED = "not resolved in double precision: "
 ACROSS = f"{UNRESOLVED}on which side of the stability limit a closed-loop pole lies"
+COUNTED = f"{UNRESOLVED}how many closed-loop poles are unstable; some are"
 _MOVED = 1e-9
 _FAR_DB = 30.0
 _FAR = 10.0 ** (_FAR_DB / 20.0)  # a real-axis crossing farther from -1 than this is of no consequence
@@ -23,27 +25,33 @@ Lists = tuple[Crossings, Crossings]  # of the unit circle and of the negative re
 
 @dataclass(frozen=True)
 class Shared:
-    """The crossings that double precision resolves."""
+    """The crossings, less those far from -1 that double precision does not resolve."""
 
     gains: Crossings
     reals: Crossings
-    dropped: int = 0  # crossings of the real axis, far from -1, that they do not
+    dropped: int = 0  # crossings of the real axis, far from -1, that it does not resolve
     moved: float = 0.0  # largest relative change of a crossing among the neighbours
-    problem: str | None = None  # why there is no answer
+    unsure: str = ""  # which near -1 is one of the given doubles, and not of all their neighbours
 
     @property
     def moved_text(self) -> str:
         what = f"moves a crossing by {self.moved:.1g}" if self.moved > _MOVED else "changes nothing"
+        what = "decides about a crossing" if self.unsure else what
         return f"rounding of the entries {what}"
 
     @property
     def notes(self) -> tuple[str, ...]:
-        if not self.dropped:
-            return ()
-        return (
+        left_out = (
             f"crossings of the real axis more than {_FAR_DB:g} dB from -1 that are left out, as double "
-            f"precision does not resolve them: {self.dropped}",
+            f"precision does not resolve them: {self.dropped}"
         )
+        return tuple(note for note in (self.dropped and left_out, self.unsure) if note)
+
+
+def settled(lists: Callable[[bool], Sequence[Lists]]) -> Shared:
+    """What a loop and its neighbours share; with what is merged where they do not share it otherwise."""
+    found = shared(*lists(False))
+    return shared(*lists(True)) if found.unsure else found
 
 
 def shared(ours: Lists, *others: Lists) -> Shared:
@@ -52,13 +60,13 @@ def shared(ours: Lists, *others: Lists) -> Shared:
     for _, theirs in others:
         kept = tuple(c for c in reals if not _far(c) or _partner(c, theirs))
         dropped, reals = dropped + len(reals) - len(kept), kept
-    moved, problem = 0.0, None
+    moved, unsure = 0.0, ""
     for their_gains, their_reals in others:
-        problem = problem or _difference(gains, their_gains, "|L| = 1")
-        problem = problem or _difference(reals, their_reals, "the real axis")
+        unsure = unsure or _difference(gains, their_gains, "|L| = 1")
+        unsure = unsure or _difference(reals, their_reals, "the real axis")
         moved = max([moved, *(_movement(c, their_gains) for c in gains)])
         moved = max([moved, *(_movement(c, their_reals) for c in reals)])
-    return Shared(gains, reals, dropped, moved, problem)
+    return Shared(gains, reals, dropped, moved, unsure)
 
 
 def _far(c: Crossing) -> bool:
@@ -77,16 +85,16 @@ def _partner(c: Crossing, others: Crossings) -> Crossing | None:
     return None
 
 
-def _difference(ours: Crossings, theirs: Crossings, line: str) -> str | None:
-    """Why two lists do not hold the same crossings, those far from -1 left out."""
+def _difference(ours: Crossings, theirs: Crossings, line: str) -> str:
+    """What two lists do not share, those far from -1 left out."""
     core, their_core = [c for c in ours if not _far(c)], [c for c in theirs if not _far(c)]
     if [c.touch for c in core] == [c.touch for c in their_core]:
-        return None
+        return ""
     alone = [c for c in core if _partner(c, theirs) is None]
     alone += [c for c in their_core if _partner(c, ours) is None]
     if not alone:
-        return None
-    return f"{UNRESOLVED}whether L meets {line} at w = {alone[0].w:.6g} of the s-plane"
+        return ""
+    return f"{UNRESOLVED}whether L meets {line} at w = {alone[0].w:.6g} of the s-plane; listed as given"
 
 
 def _movement(c: Crossing, others: Crossings) -> float:
