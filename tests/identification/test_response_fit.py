@@ -15,6 +15,7 @@ from actuator_lti.errors import InputError
 from actuator_lti.types import Floats
 from analyses.estimation.parameters import own_std
 from analyses.identification.measured_response import ResponseResult, identify_response
+from analyses.identification.response_search import Point, Search
 from reports.charts.chart import Curve
 from reports.charts.data import chart_of
 from reports.sections.identify import section
@@ -310,6 +311,18 @@ def test_what_hangs_on_a_kept_value_is_counted_once_in_the_written_design(stated
     share = 0.2 / np.sqrt(3.0) if stated else 0.05
     assert result.fit.std(J) == pytest.approx(share * TRUTH[Jl] / N**2, rel=0.05)
     assert ("correlated with it" in result.fit.fixed[Jl].reason) == stated
+
+
+def test_intervals_beside_a_value_that_is_held_wrong_take_few_fits(tmp_path, monkeypatch) -> None:
+    """Ten times the loop beside the rotor's inertia: the way out along a bent valley took 1771 fits."""
+    fits, least = list[Point](), Search.least
+    monkeypatch.setattr(Search, "least", lambda *at, **how: fits.append(at[1]) or least(*at, **how))
+    file = _written(tmp_path, HERTZ, 10.0 * _noisy(open_loop(HERTZ), 0.01, 1), 0.01)
+    result = identify_response(
+        _design(OFF), file, fixed={"motor.rotor_inertia": TRUTH["motor.rotor_inertia"]}
+    )
+    assert item_of(result, "misfit").passed is False
+    assert len(fits) < 200
 
 
 def test_another_drive_than_the_model_fails(tmp_path, cli) -> None:
