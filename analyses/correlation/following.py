@@ -109,15 +109,15 @@ def followed(
 
 def _limit(recorded: Mapping[str, Floats], simulated: Mapping[str, Floats]) -> str:
     """A limit of the drive that the design does not have: of what is longest near its largest value."""
-    told = dict[float, str]()
+    reasons = dict[float, str]()
     for name, (key, unit) in LIMITED.items():
         sizes = [np.abs(one[name]) for one in (recorded, simulated) if name in one]
         if len(sizes) == 2 and (most := sizes[0].max()) < (would := sizes[1].max()) / OVER:
             why = (
                 f"the {name} stays below {most:.3g} {unit}, the design's loops take up to {would:.3g} {unit}"
             )
-            told[float(np.mean(sizes[0] > most / OVER))] = f"a lower limit of the {name} ({key}): {why}"
-    return told[max(told)] if told else ""
+            reasons[float(np.mean(sizes[0] > most / OVER))] = f"a lower limit of the {name} ({key}): {why}"
+    return reasons[max(reasons)] if reasons else ""
 
 
 def moved_by_clock(driven: Driven, record: Record, place: str, model: Floats) -> Floats | None:
