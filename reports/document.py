@@ -237,14 +237,14 @@ def details(title: str, blocks: Sequence[Block]) -> Block:
 
 def section(
     id: str, title: str, blocks: Sequence[Block], *, result: str = "", intro: str = "",
-    status: Status = "info", severity: Severity | None = None, findings: Iterable[Finding] = (),
+    status: Status | None = None, severity: Severity | None = None, findings: Iterable[Finding] = (),
     verdict: Verdict | None = None,
 ) -> Section:  # fmt: skip
     """Make a section; ``id`` is its anchor.
 
     ``result``: one sentence that says what was found, ``intro``: how. ``severity``: how grave the result is,
-    where the first screen says it; ``findings``: what else that has to say. ``verdict`` counts beside
-    the verdicts in it: where it is not proven, so is the document.
+    where the first screen says it, and its status where that is no other; ``findings``: what else that screen
+    has to say. ``verdict`` counts beside the verdicts in it: where it is not proven, so is the document.
     """
     first = [Finding(severity=severity, text=result, where=id)] if severity and result else []
     made: Section = {
@@ -252,7 +252,7 @@ def section(
         "title": title,
         "result": prose(result),
         "intro": prose(intro),
-        "status": status,
+        "status": status or severity or "info",
         "blocks": list(blocks),
         "findings": [{**one, "text": prose(one["text"])} for one in (*first, *findings)],
     }

@@ -20,7 +20,7 @@ from actuator_lti.errors import InputError
 from actuator_lti.files.reading import Tree
 from actuator_lti.loops import Form, Loop, Loops, assemble_loops, exact_margins
 from actuator_lti.margins import stability_margins
-from nonlinear.export.c_files import stage_words
+from nonlinear.export.c_files import amperes_words, stage_words
 
 SCHEMA = "actuator-lti/linear"
 SUFFIXES = {"json": ".json", "mat": ".mat", "python": ".py"}
@@ -55,6 +55,7 @@ def system(entry):
 def linear_models(design: Design) -> Tree:
     """The tree of a design at its usual operating point: per form its loops, break points and responses."""
     about = {"name": design.name, "revision": design.revision or "", "hash": design_hash(design)}
+    about |= {"amperes": words} if (words := amperes_words(design)) else {}
     tree: Tree = {"schema": SCHEMA, "version": 1, "design": about}
     for form in FORMS[:1] if design.controller.sampled_only else FORMS:
         tree[form] = _form(assemble_loops(design, form))

@@ -1,25 +1,15 @@
-"""The picture of an exported unit: controller above, drive train below, drawn from the design."""
+"""The picture of an exported unit: controller above, drive train below, typeset from the design."""
 
+import json
 import math
-from collections.abc import Sequence
 from importlib.util import find_spec
+from pathlib import Path
 
 from actuator_lti.design.model import Design
-from reports.charts.chart import COLOURS
-from reports.charts.pen import Pen
 from reports.numbers import seconds
 
-WIDTH, HEIGHT = 640, 300
-LEFT, TOP, GAP = 16.0, 62.0, 14.0
-BOX_HEIGHT, ROW = 62.0, 128.0
-PEN = Pen(prefix="", page=False, keys={})
-FONT = "DejaVu Sans Mono"  # comes with the typesetter, so that the picture is the same on every machine
+TEMPLATE = Path(__file__).resolve().parent / "templates" / "pdf" / "model.typ"
 PPI = 144.0  # two pixels a point
-MOST_CHARACTERS = 14
-_PAGE = """#set page(width: {width}pt, height: {height}pt, margin: 0pt)
-#image(bytes(sys.inputs.svg), width: {width}pt)
-"""
-
 Box = tuple[str, str]
 
 
@@ -29,23 +19,15 @@ def model_png(design: Design) -> bytes | None:
         return None
     import typst
 
-    page = _PAGE.format(width=WIDTH, height=HEIGHT)
-    made = typst.compile(page.encode(), format="png", ppi=PPI, sys_inputs={"svg": model_svg(design)})
+    more = ", output encoder" * (design.output_encoder.counts_per_rev is not None)
+    model = {
+        "name": design.name, "title": design.title, "measured": f"measured: current, encoder{more}",
+        "controller": controller_boxes(design), "train": train_boxes(design),
+    }  # fmt: skip
+    data = {"model": json.dumps(model)}
+    made = typst.compile(str(TEMPLATE), root=str(TEMPLATE.parent), format="png", ppi=PPI, sys_inputs=data)
     assert isinstance(made, bytes)
     return made
-
-
-def model_svg(design: Design) -> str:
-    parts = [
-        f'<rect width="{WIDTH}" height="{HEIGHT}" fill="{COLOURS["paper"]}"/>',
-        _words(WIDTH / 2, 28, design.name, 17, bold=True),
-        _words(WIDTH / 2, 46, design.title, 10, colour="muted", most=80),
-        *_row(controller_boxes(design), TOP, "c1"),
-        *_row(train_boxes(design), TOP + ROW, "c3"),
-        *_returns(design),
-    ]
-    size = f'width="{WIDTH}" height="{HEIGHT}" viewBox="0 0 {WIDTH} {HEIGHT}"'
-    return f'<svg xmlns="http://www.w3.org/2000/svg" {size} font-family="{FONT}">{"".join(parts)}</svg>'
 
 
 def controller_boxes(design: Design) -> list[Box]:
@@ -81,50 +63,3 @@ def train_boxes(design: Design) -> list[Box]:
         boxes.insert(place, ("coupling", f"play {1e3 * play:.3g} {unit}" if play else "elastic"))
     boxes.append(("load", f"{design.load.inertia_kgm2:.3g} kg{' m2' if design.axis == 'rotary' else ''}"))
     return boxes
-
-
-def _row(boxes: Sequence[Box], top: float, colour: str) -> list[str]:
-    width = (WIDTH - 2 * LEFT - GAP * (len(boxes) - 1)) / len(boxes)
-    parts = []
-    for n, (title, value) in enumerate(boxes):
-        x, middle = LEFT + n * (width + GAP), top + BOX_HEIGHT / 2
-        most = min(MOST_CHARACTERS, int(width / 6.4))
-        parts.append(
-            f'<rect x="{x:.1f}" y="{top:g}" width="{width:.1f}" height="{BOX_HEIGHT:g}" rx="7" '
-            f'fill="{COLOURS[colour]}" fill-opacity="0.09" stroke="{COLOURS[colour]}" stroke-width="1.5"/>'
-        )
-        parts.append(_words(x + width / 2, middle - 4, title, 11, bold=True, most=most))
-        parts.append(_words(x + width / 2, middle + 14, value, 9.5, most=int(width / 5.8)))
-        if n:
-            parts.append(_arrow([(x - GAP, middle), (x - 1.5, middle)]))
-    return parts
-
-
-def _returns(design: Design) -> list[str]:
-    """Voltage down to the motor, measured values back up to the controller."""
-    right, low, high = WIDTH - LEFT - 28.0, TOP + ROW, TOP + BOX_HEIGHT
-    middle, bottom = 0.5 * (low + high), low + BOX_HEIGHT
-    down = [(right, high), (right, middle - 10), (LEFT + 28.0, middle - 10), (LEFT + 28.0, low - 1.5)]
-    has_output = design.output_encoder.counts_per_rev is not None
-    words = "measured: current, encoder" + ", output encoder" * has_output
-    return [
-        _arrow(down),
-        _words(WIDTH / 2, middle - 15, "voltage", 9.5, colour="muted"),
-        _words(WIDTH / 2, bottom + 24, words, 9.5, colour="muted", most=80),
-    ]
-
-
-def _arrow(points: Sequence[tuple[float, float]]) -> str:
-    (x0, y0), (x, y) = points[-2], points[-1]
-    dx, dy = (5.0, 0.0) if y == y0 and x > x0 else (0.0, 5.0)
-    sides = [(x - dx + way * dy / 1.6, y - dy + way * dx / 1.6) for way in (-1, 1)]
-    lines = (points, (sides[0], (x, y), sides[1]))
-    path = "".join("M" + "L".join(f"{a:.1f} {b:.1f}" for a, b in line) for line in lines)
-    return f'<path d="{path}" fill="none" stroke="{COLOURS["ink"]}" stroke-width="1.2"/>'
-
-
-def _words(
-    x: float, y: float, text: str, size: float, *, colour: str = "ink", bold: bool = False, most: int = 60
-) -> str:
-    short = text if len(text) <= most else text[: most - 1] + "."
-    return PEN.words(short, x, y, size=size, anchor="middle", colour=colour, bold=bold)

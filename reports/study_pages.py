@@ -40,7 +40,11 @@ def design_head(design: Design) -> Tree:
 # The simulated current of an AC motor is that of its DC equivalent, not the data sheet's.
 _OTHER = r"\bA\b(?! ?(?:dc|rms|pe?a?k|phase)|\()"
 _BEFORE = r"(?:(?<=\d )|(?<=[Nm]/))"  # a number or a torque per
-_WHERE = {"unit": "", "label": "(?<=, )", **dict.fromkeys(("result", "text", "reason", "note"), _BEFORE)}
+_WHERE = {
+    "unit": "",
+    "label": "(?<=, )",
+    **dict.fromkeys(("result", "intro", "text", "reason", "note"), _BEFORE),
+}
 _SHEETS = {"rms-line": "rms", "peak-phase": "peak of a phase"}
 _WORDS = {key: re.compile(before + _OTHER) for key, before in _WHERE.items()}
 

@@ -9,6 +9,7 @@ from actuator_lti.design.data_sheet import SHEET, stated_in
 from actuator_lti.design.field import BIG, Field, Structure
 from actuator_lti.design.fields import FIELDS, RECORDS, field_of, fields_in
 from actuator_lti.design.model import Axis, Design
+from actuator_lti.design.units import ampere_unit
 from actuator_lti.files.reading import Tree
 
 
@@ -91,16 +92,19 @@ def explained(design: Design) -> tuple[Explained, ...]:
     >>> items = {item.path: item for item in explained(load_design("ballscrew"))}
     >>> one = items["motor.torque_constant"]
     >>> one.written, one.read, one.model
-    ('0.50 N*m/A', '314.159265 N/A', 'kM = 256.509966 N/A')
+    ('0.50 N*m/A', '314.159265 N/A', 'kM = 256.509966 N/A dc')
     """
     result = []
     for path, item in design.parameters.items():
         field, value = field_of(path), item.value
         if path.startswith("motor.") and field is not None:
             value = getattr(design.effective_motor, field.attribute)
-        unit = "" if item.unit == "1" else f" {item.unit}"
-        modelled = f"{item.symbol}{' = ' * bool(item.symbol)}{value:.9g}{unit}"
-        result.append(Explained(path, item.stated or item.text, f"{item.value:.9g}{unit}", modelled))
+        read, made = (
+            f"{number:.9g} {ampere_unit(of, item.unit, design.motor.constants)}".removesuffix(" 1")
+            for number, of in ((item.value, path), (value, "limits."))
+        )
+        modelled = f"{item.symbol}{' = ' * bool(item.symbol)}{made}"
+        result.append(Explained(path, item.stated or item.text, read, modelled))
     sheet = (Explained(*stated, "friction, below") for stated in stated_in(design))
     at = next((k for k, one in enumerate(result) if one.path.startswith("friction.")), len(result))
     return (*result[:at], *sheet, *result[at:], *_own_law(design))

@@ -286,6 +286,11 @@ class Reader:
             if isinstance(width, str) and self.frame.upside_down(width, field):
                 share = 100.0 * value / self.frame.quantity(width, field)
                 raise InputError(f'a width upside down; allowed: a share, here "{share:.4g} %", or {unit}')
+            for key, turned in (("lower", "upper"), ("upper", "lower")):
+                bound = raw.get(key) if isinstance(raw, dict) else None
+                if isinstance(bound, str) and self.frame.upside_down(bound, field):
+                    said = f'{turned} = "{self.frame.quantity(bound, field):.6g} {unit}"'
+                    raise InputError(f"a bound upside down; allowed: {said}", where=key)
             return read_tolerance(raw, value, lambda text: self.frame.quantity(text, field), field, unit)
         except InputError as error:
             at = f"{path}.{error.where}" if error.where else path

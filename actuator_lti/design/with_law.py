@@ -60,6 +60,7 @@ def _state_space(system: Any, name: str = "system") -> tuple[Any, Any, Any, Any,
 
 def _inputs(system: Any, inputs: Sequence[str] | None) -> list[str]:
     given = getattr(system, "input_labels", None) if inputs is None else inputs
+    given = given.tolist() if isinstance(given, np.ndarray) else given
     listed: list[Any] = list(given) if isinstance(given, Sequence) and not isinstance(given, str) else [given]
     for name in listed:
         if name not in LAW_WORDS or given is name:

@@ -198,6 +198,13 @@ def fixed_values(design: Design, texts: Sequence[str] | None) -> dict[str, float
     return result
 
 
+def refuse_linear(design: Design, what: str) -> None:
+    """Refuse what is read in the units of a shaft alone: rad, N m."""
+    if design.axis == "linear":
+        allowed = "allowed for a linear axis: records of a motion, the response of a loop"
+        raise InputError(f'design.axis = "linear": {what} is of a rotary drive; {allowed}', design.name)
+
+
 def held_by_name(
     fixed: Mapping[str, float], names: Sequence[str], more: Mapping[str, str] | None = None
 ) -> dict[str, float]:

@@ -11,6 +11,7 @@ from actuator_lti.errors import InputError, NumericalError
 from actuator_lti.types import Floats, Progress
 from analyses.estimation.least_squares import scaled_lstsq
 from analyses.estimation.parameters import default_value
+from analyses.identification.asked import refuse_linear
 from analyses.identification.design_values import design_value, kept_constant
 from analyses.identification.points import SteadyPoint, steady_point
 from analyses.identification.richer import RicherLaws, compare_laws
@@ -80,10 +81,11 @@ def identify_campaign(
     The design's torque constant makes torques of currents; ``richer``: whether to ask, by cross-validation,
     for a richer law; ``fixed``: coefficients (C0, Cv, CM) that are held at a value.
 
-    Raises `InputError`: without a torque constant, or with too few usable runs; the reasons of those set
-    aside are told.
+    Raises `InputError`: of a linear axis, without a torque constant, or with too few usable runs; the reasons
+    of those set aside are told.
     """
     design = as_design(design)
+    refuse_linear(design, "a campaign")
     constant = design.effective_motor.torque_constant_Nm_A
     if constant is None:
         why = "motor.torque_constant: the design has none, so currents cannot become torques"

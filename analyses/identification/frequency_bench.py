@@ -13,7 +13,7 @@ from actuator_lti.types import Floats
 from analyses.estimation.fit import Fit, Fixed
 from analyses.estimation.parameters import parameter
 from analyses.identification import two_mass, verdict
-from analyses.identification.asked import held_by_name
+from analyses.identification.asked import held_by_name, refuse_linear
 from analyses.identification.design_values import STEP, at_constant, constant_of, kept_constant
 from analyses.identification.play import Play, play_of
 from analyses.identification.rows import drive_of
@@ -73,6 +73,7 @@ def identify_frequency(
     is of a torque that reverses, with the angles of both sides. ``period_s`` is found from the command
     otherwise.
     """
+    refuse_linear(design, "a frequency response")
     record = prepared(record)
     play_record = None if play_record is None else prepared(play_record)
     if "angle" not in record.signals:

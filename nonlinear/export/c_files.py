@@ -5,6 +5,7 @@ import re
 from actuator_lti.compiled.kinds import c_float
 from actuator_lti.design.loader import AnyDesign, as_design
 from actuator_lti.design.model import Design
+from actuator_lti.design.plant import DC_PER_A
 from actuator_lti.design.writing import design_hash
 from actuator_lti.errors import InputError
 from actuator_lti.start.extras import package_version
@@ -81,6 +82,18 @@ def _refuse_single(design: Design) -> None:
         raise InputError(f"{message}, or no --single", where=design.origin or design.name)
 
 
+def amperes_words(design: Design) -> str:
+    """What A and V of an AC motor are (docs/model.md, section 1); nothing of a DC motor's.
+
+    >>> amperes_words(as_design("ballscrew"))
+    'Of an equivalent DC motor: 1.225 A is 1 A rms, 0.866 A is 1 A peak of a phase, V is peak line-line.'
+    """
+    if design.motor.constants == "dc":
+        return ""
+    rms, peak = (f"{DC_PER_A[one]:.4g} A is 1 A" for one in ("rms-line", "peak-phase"))
+    return f"Of an equivalent DC motor: {rms} rms, {peak} peak of a phase, V is peak line-line."
+
+
 def stage_words(design: Design) -> tuple[str, str]:
     """What the command of the outermost stage is, and its unit."""
     angle, unit = ("output position", "m") if design.axis == "linear" else ("output angle", "rad")
@@ -134,5 +147,6 @@ def _readme(design: Design, p: Floats, s: Floats, single_precision: bool) -> dic
         "IO": str(at.IO_SIZE),
         "BYTES": str(number * (p.size + s.size + at.IO_SIZE)),
         "STIFFER": longer if step else "",
+        "AMPERES": f" {amperes_words(design)}".rstrip(),
         "AXIS": "linear (m, N, kg)" if design.axis == "linear" else "rotary (rad, N m, kg m2)",
     }

@@ -12,7 +12,7 @@ from actuator_lti.design.loader import AnyDesign, as_design
 from actuator_lti.design.writing import design_hash
 from actuator_lti.start.extras import package_version
 from nonlinear._kernels import layout as at
-from nonlinear.export.c_files import plain, refuse_prefix
+from nonlinear.export.c_files import amperes_words, plain, refuse_prefix
 from nonlinear.export.controller_cut import ENTRIES, Controller, begins, controller_of
 from nonlinear.export.controller_names import SIGNAL_AT, member_words
 from nonlinear.export.controller_vectors import roundings, vectors_text
@@ -47,7 +47,7 @@ def controller_export(
         "CONSTANTS": _constants(ours, prefix.upper()), "FLAGS": _flags(prefix.upper()),
         "STRUCTS": _structs(ours), "SIZES": _sizes(ours, "f" if single_precision else "d"),
         "DECLARATIONS": "\n\n".join(declared(ours.program, ENTRIES)), "ANGLES": _angles(ours, prefix.upper()),
-        "ROUNDINGS": str(roundings(ours)),
+        "ROUNDINGS": str(roundings(ours)), "AMPERES": f" {amperes_words(design)}".rstrip(),
         "SOURCE_HASH": hashlib.sha256(source.encode()).hexdigest(),
     }  # fmt: skip
     values["LIBRARY"] = f"{called} of the mathematical library" if called else "no function of any library"

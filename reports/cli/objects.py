@@ -55,11 +55,11 @@ def export(
         drive = replace(drive, objects=replace(drive.objects, velocity_gain_factor=calibration(per)))
     result = export_objects(drive, complete=complete or None)
     if into is not None or (out is not None and out.suffix.lower() in (".xdc", ".xml")):
-        text, homeless = settings_xml(result.objects, into)
-        unsaid = result.objects.velocity_gain_factor != 1.0
+        held, (text, homeless) = "XML", settings_xml(result.objects, into)
     else:
-        text, homeless, unsaid = write_settings_toml(result.objects), (), False
-    write_new(out, text, force)
+        held, text, homeless = "TOML", write_settings_toml(result.objects), ()
+    write_new(out, text, force, held)
+    unsaid = held == "XML" and result.objects.velocity_gain_factor != 1.0
     notes = [*(f"rounded: {item}" for item in result.rounded), *result.notes]
     notes += [f"no place for it in {into}: {label}" for label in homeless]
     notes += ["XML has no place for that factor: import it with --velocity-gain-per rpm"] * unsaid

@@ -141,10 +141,18 @@ def refuse_existing(path: Path, force: bool) -> None:
         raise InputError("exists already; allowed: another name, or --force", where=str(path))
 
 
-def write_new(path: Path | None, text: str, force: bool) -> None:
-    """Write a file that is not there yet, or with ``--force``; nothing without a path."""
+_HELD = {".toml": "TOML", ".json": "JSON", ".xml": "XML", ".xdc": "XML"}  # by files of such a name
+
+
+def write_new(path: Path | None, text: str, force: bool, held: str = "TOML") -> None:
+    """Write a file that is not there yet, or with ``--force``; nothing without a path.
+
+    Refused is a name that says otherwise than what it would have ``held``.
+    """
     from actuator_lti.files.atomic import write_text
 
     if path is not None:
+        if (named := _HELD.get(path.suffix.lower(), held)) != held:
+            raise InputError(f"would hold {held}, no {named}; allowed: another name", where=str(path))
         refuse_existing(path, force)
         write_text(path, text)

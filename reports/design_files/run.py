@@ -14,8 +14,7 @@ from actuator_lti.design.model import Axis, Design
 from actuator_lti.design.sheet_words import key_for
 from actuator_lti.drive.sheet_figures import SheetFigure, sheet_figures
 from actuator_lti.errors import InputError
-from actuator_lti.files.atomic import write_text
-from reports.cli.options import refuse_existing
+from reports.cli.options import write_new
 from reports.design_files.asked import KINDS, AskedKeys, AskedStart
 from reports.design_files.parts import with_parts
 
@@ -143,7 +142,6 @@ class Started:
 
 def init(asked: AskedStart) -> Started:
     """Write a commented design file, named as the file is, where there is none already."""
-    refuse_existing(asked.file, asked.force)
     source = KINDS[asked.kind] if asked.kind else asked.source
     starter = Path(__file__).parents[1] / "templates" / "design.toml"
     text = starter.read_text(encoding="utf-8") if source is None else design_text(source)
@@ -153,5 +151,5 @@ def init(asked: AskedStart) -> Started:
         head = r'(?m)^(\[design\]\n(?:[^\[\n]*\n)*?name = )"[^"\n]*"'
         text = re.sub(head, rf'\1"{name}"', text, count=1)
     read_design_text(text, str(asked.file))
-    write_text(asked.file, text)
+    write_new(asked.file, text, asked.force)
     return Started(str(asked.file))

@@ -1,7 +1,7 @@
 """Variants side by side: verdicts, figures with differences, what moved them, predictions."""
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -173,24 +173,25 @@ def _of_figures(
     title: str, names: Sequence[FigureName], head: doc.Shown, of: Comparison,
     parts: Sequence[Sequence[Compared]], note: str = "",
 ) -> list[doc.Block]:  # fmt: skip
-    unit = doc.of(lambda name: _scaled(of, name)[1], "unit", "Unit")
-    return _side_by_side(title, names, [head, unit], parts, partial(_cell, of), note)
+    all_designs = of.everything.all
+    scaled = {
+        name.key: row_unit(name.unit, (one.figures.get(name.key) for one in all_designs)) for name in names
+    }
+    unit = doc.of(lambda name: scaled[name.key][1], "unit", "Unit")
+    return _side_by_side(title, names, [head, unit], parts, partial(_cell, of, scaled), note)
 
 
-def _cell(comparison: Comparison, one: Compared, name: FigureName) -> str | None:
+def _cell(
+    comparison: Comparison, scaled: Mapping[str, tuple[float, str]], one: Compared, name: FigureName
+) -> str | None:
     value = one.figures.get(name.key)
     if value is None:
         return None
-    scale, _ = _scaled(comparison, name)
+    scale, _ = scaled[name.key]
     words = _with_change(scale * value, scale * one.differences.get(name.key, 0.0))
     best, worst = (number(scale * end) for end in comparison.ends(name) or (0.0, 0.0))
     marks = {} if best == worst else {best: " ▲", worst: " ▽"}  # none where all show the same digits
     return words + marks.get(number(scale * value), "")
-
-
-def _scaled(comparison: Comparison, name: FigureName) -> tuple[float, str]:
-    """Factor and unit of a figure's row, the same for all designs."""
-    return row_unit(name.unit, (one.figures.get(name.key) for one in comparison.everything.all))
 
 
 def differences(comparison: Comparison) -> doc.Section:

@@ -31,7 +31,7 @@ def section(result: Corners) -> doc.Section:
         blocks += [doc.figure("corners", chart(result), caption, alt=alt), details]
     grave = doc.severity(result.verdict)
     words = summary(result)
-    return doc.section("corners", "Corners", blocks, result=words, intro=intro, status=grave, severity=grave)
+    return doc.section("corners", "Corners", blocks, result=words, intro=intro, severity=grave)
 
 
 def summary(result: Corners) -> str:

@@ -24,11 +24,9 @@ def section(result: LimitCycles) -> doc.Section:
     causes = " or ".join(CAUSES[name] for name in result.looked_for) or "play or a quantised output sensor"
     none = doc.text(f"No limit cycle of {causes} is predicted.")
     predicted = _predicted(result, fine) if result.cycles else none
-    grave = doc.severity(result.verdict)
-    blocks, words = [predicted, _rests(result, fine)], summary(result)
-    return doc.section(
-        "cycles", "Limit cycles", blocks, result=words, intro=intro, status=grave, severity=grave
-    )
+    grave, words = doc.severity(result.verdict), summary(result)
+    blocks = [predicted, _rests(result, fine)]
+    return doc.section("cycles", "Limit cycles", blocks, result=words, intro=intro, severity=grave)
 
 
 def summary(result: LimitCycles) -> str:

@@ -35,7 +35,7 @@ def section(result: Duty) -> doc.Section:
     grave = "warn" if grave == "info" and result.limited else grave
     own = requirements.table(result.requirements)
     blocks, words = [table, *own, _figure(result)], summary(result)
-    return doc.section("duty", "Duty cycle", blocks, result=words, intro=intro, status=grave, severity=grave)
+    return doc.section("duty", "Duty cycle", blocks, result=words, intro=intro, severity=grave)
 
 
 RATED = {

@@ -6,6 +6,7 @@ from typing import Any
 
 from actuator_lti.asked.quantities import unit_words
 from actuator_lti.design.model import Design, Parameter
+from actuator_lti.design.units import ampere_unit
 from reports import document as doc
 from reports.numbers import short
 
@@ -15,16 +16,22 @@ GRADES = (
     "C community transcription; D derived; X assumed, to be replaced by whoever has the figure."
 )
 NO_RECORD = "The design carries no record of where its values come from."
-COLUMNS = [
-    doc.of("path", "path", "Key"),
-    doc.of("symbol", "symbol", "Symbol"),
-    doc.of(lambda item: _written(item.text), "text", "As written"),
-    doc.of("value", "value", "In SI", format="short:6"),
-    doc.of(lambda item: unit_words(item.unit), "unit", "Unit"),
-    doc.of("grade", "grade", "Grade"),
-    doc.of(lambda item: tolerance_words(item), "tolerance", "Tolerance"),
-    doc.of("source", "source", "Source"),
-]
+
+
+def _columns(design: Design) -> list[doc.Shown]:
+    constants = design.motor.constants
+    return [
+        doc.of("path", "path", "Key"),
+        doc.of("symbol", "symbol", "Symbol"),
+        doc.of(lambda item: _written(item.text), "text", "As written"),
+        doc.of("value", "value", "In SI", format="short:6"),
+        doc.of(lambda item: unit_words(ampere_unit(item.path, item.unit, constants)), "unit", "Unit"),
+        doc.of("grade", "grade", "Grade"),
+        doc.of(lambda item: tolerance_words(item), "tolerance", "Tolerance"),
+        doc.of("source", "source", "Source"),
+    ]
+
+
 _OF_FACTS = {"label": "What", "value": "Value", "grade": "Grade", "source": "Source"}
 FACTS = [doc.of(name, name, heading) for name, heading in _OF_FACTS.items()]
 
@@ -37,7 +44,7 @@ def section(design: Design, warnings: Sequence[str] = ()) -> doc.Section:
         column = doc.of(str, "warning", "Warning")
         blocks.append(doc.listing("To be checked", warnings, [column], status=lambda _: "warn"))
     if parameters:
-        blocks.append(doc.listing("Values of the design file", parameters, COLUMNS))
+        blocks.append(doc.listing("Values of the design file", parameters, _columns(design)))
     if design.facts:
         facts = doc.listing("Facts", design.facts, FACTS)
         blocks.append(doc.details("Facts that enter no equation", [facts]))

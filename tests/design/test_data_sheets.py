@@ -109,12 +109,18 @@ def test_a_speed_constant_is_a_back_emf_constant_upside_down() -> None:
             with_overrides(design, {"motor.back_emf_constant": wrong})
 
 
-def test_a_width_upside_down_is_refused_with_its_share() -> None:
-    """10 of 317 rpm/V are 3.155 %; as a back-EMF constant of 10 rpm/V they were 32 times the value."""
+def test_a_width_or_bound_upside_down_is_refused_with_what_it_is() -> None:
+    """10 of 317 rpm/V are 3.155 %; as a back-EMF constant of 10 rpm/V they were 32 times the value.
+
+    At least 300 rpm/V is at most 60/(2 pi 300) = 0.031831 V s/rad.
+    """
     speed = {"value": "317 rpm/V", "tolerance": {"kind": "normal", "std": "10 rpm/V"}}
     motor = {"motor.torque_constant": "30.2 mN*m/A", "motor.back_emf_constant": speed}
     with pytest.raises(InputError, match=r'upside down; allowed: a share, here "3.155 %", or V\*s/rad'):
         with_overrides(AMBER, motor)
+    bounds = {"kind": "truncated-normal", "std": "3 %", "lower": "300 rpm/V", "upper": "330 rpm/V"}
+    with pytest.raises(InputError, match=r'lower = .* upside down; allowed: upper = "0\.031831 V\*s/rad"'):
+        with_overrides(AMBER, {**motor, "motor.back_emf_constant": {**speed, "tolerance": bounds}})
     for width, std in (("1 mV*s/rad", 1e-3), ("3 %", 0.03 * 60.0 / (2 * pi * 317))):
         speed["tolerance"]["std"] = width
         held = with_overrides(AMBER, motor).parameters["motor.back_emf_constant"].tolerance
@@ -211,7 +217,9 @@ def test_a_required_current_is_read_as_limits_read_theirs(text, amperes, quantit
 def test_a_design_is_explained_as_written_as_read_and_as_the_model_has_it(cli) -> None:
     items = {item.path: item for item in explained(SERVO)}
     assert items["motor.torque_constant"].written == "0.93 N*m/A"
-    assert items["motor.torque_constant"].model == f"kM = {0.93 / sqrt(1.5):.9g} N*m/A"
+    assert items["motor.torque_constant"].model == f"kM = {0.93 / sqrt(1.5):.9g} N*m/A dc"
+    axis = {item.path: item for item in explained(load_design("ballscrew"))}
+    assert axis["limits.peak_current"].read == "14.7 A dc"
     assert items["motor.rotor_inertia"].read == "5.9e-05 kg*m^2"
     told = {"written": "5.9 mN*m/A", "read": "0.0059 N*m/A", "model": "kM = 0.0059 N*m/A"}
     asked = cli.data("keys", "torque_constant", "--explain", "ilr33-amber")["keys"]

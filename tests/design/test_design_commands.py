@@ -54,6 +54,9 @@ def test_init_does_not_overwrite_without_being_told_and_a_bad_source_writes_noth
     path.write_text("precious")
     assert "--force" in cli.refused("init", path)
     assert path.read_text() == "precious"
+    for words in (["init"], ["objects", "export", "--out"]):  # wrote TOML there
+        said = cli.refused(*words, tmp_path / "new.json")
+        assert "new.json: would hold TOML, no JSON; allowed: another name" in said
     bad.write_text("[design]\nname = 3\n")
     for source in ("nope", str(bad)):
         status, _, error = cli("init", tmp_path / "new.toml", "--from", source)

@@ -72,6 +72,8 @@ def test_the_readme_says_what_sizeof_gives_and_how_to_compile(name: str, single:
     """Padding is what the compiler says; the line of the readme links what a profile with a root calls."""
     folder, readme = written(tmp_path, load_design(name), single=single), (tmp_path / "README.md")
     assert said_by(folder, PROGRAMS / "size.c") in readme.read_text()
+    amperes = "1.225 A is 1 A rms, 0.866 A is 1 A peak of a phase"  # sqrt(3/2) and sqrt(3)/2, of an AC motor
+    assert (amperes in readme.read_text()) == (name == "ballscrew")
     (line,) = re.findall(r"^    (cc .*) && ./vectors$", readme.read_text(), re.M)
     ran(folder, *line.split())
 

@@ -107,6 +107,7 @@ def test_it_says_which_forms_there_are_and_that_the_command_is_behind_its_mean(c
     assert "mean of 160 samples" in told
     assert "sampled and continuous" in told
     assert read(path)["sampled"]["responses"]["command"]["behind_mean_of_samples"] == 160
+    assert "1.225 A is 1 A rms" in read(path)["design"]["amperes"]
     law = load_design("emps").with_law("position", ([], [], [], [[300.0]], 1e-3), inputs=["error"])
     (own := tmp_path / "own.toml").write_text(write_design(law), encoding="utf-8")
     told = cli.text("export", "linear", own, "--out", path := tmp_path / "own.json")

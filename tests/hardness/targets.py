@@ -11,8 +11,10 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from types import ModuleType
 from typing import Any
+from unittest import mock
 
 import numpy as np
 import tomli_w
@@ -27,6 +29,7 @@ from actuator_lti.design.objects import import_objects
 from actuator_lti.design.settings_file import parse_settings, write_settings_xml
 from actuator_lti.design.units import parse_quantity
 from actuator_lti.design.writing import design_tree
+from actuator_lti.files import matlab
 from actuator_lti.files.reading import decode
 from analyses.linear.outer_loop import read_outer_loop
 from analyses.records import campaign_file
@@ -44,6 +47,7 @@ from reports.nightly.cache import Cache, CorruptEntry, sealed
 from reports.nightly.history import open_history
 from reports.nightly.source import read_study
 from reports.nightly.state import INDEX, NIGHTS, remembered
+from tests.mat_reader import forked
 
 Fault = Callable[[bytes, random.Random], bytes]
 
@@ -133,6 +137,14 @@ def controller_file(path: Path) -> None:
 def accounted(found: Record) -> None:
     """Every row is used, or counted among those that are not."""
     assert found.counts.rows_in == found.counts.rows_out + sum(found.counts.dropped.values())
+
+
+def mat(read: Callable[[Path], object]) -> Callable[[Path], None]:
+    def attack(path: Path) -> None:
+        with mock.patch.object(matlab, "run", forked):
+            read(path)
+
+    return attack
 
 
 def record(path: Path) -> None:
@@ -292,14 +304,12 @@ def parquet_file() -> bytes:
 
 @cache
 def history_files() -> dict[str, bytes]:
-    import tempfile
-
     from nightly_fakes import CODE, INLINE, job
     from nightly_fakes import study as of
 
     from reports.nightly.night import run_night
 
-    with tempfile.TemporaryDirectory() as folder:
+    with TemporaryDirectory() as folder:
         for margin in (10.0, 11.0):
             run_night(of(job("a", margin), job("b")), Path(folder) / "s", INLINE, code=CODE)
         return {path.name: path.read_bytes() for path in (Path(folder) / "s.state").rglob("*.json")}
@@ -323,14 +333,14 @@ def targets() -> tuple[Target, ...]:
         Target("settings xml", (xml.encode(),), settings, ".xml"),
         Target("controller file", CONTROLLERS, controller_file, ".xml"),
         Target("response", (RESPONSE,), read_response, ".csv"),
-        Target("mat response", mat_files(), read_response, ".mat"),
+        Target("mat response", mat_files(), mat(read_response), ".mat"),
         Target("study", (STUDY,), lambda p: read_study(str(p))),
         Target("study tree", (STUDY,), lambda p: read_study(str(p)), fault=toml_fault),
         Target("campaign", (CAMPAIGN,), load_campaign),
         Target("record file", (RECORD,), record),
         Target("record", (ROWS,), lambda p: accounted(read_csv_record(p, SPEC)), ".csv"),
         Target("record by itself", (KNOWN_ROWS,), open_record, ".csv"),
-        Target("mat record", mat_files(), lambda p: accounted(read_record(p, SPEC)), ".mat"),
+        Target("mat record", mat_files(), mat(lambda p: accounted(read_record(p, SPEC))), ".mat"),
         Target("JSON record", (JSON_ROWS,), lambda p: read_record(p, SPEC), ".json", tree_fault),
         Target("parquet", (parquet_file(),), lambda p: read_record(p, SPEC), ".parquet"),
         Target("command or load", (ROWS,), lambda p: read_columns(p, (0, 1)), ".csv"),

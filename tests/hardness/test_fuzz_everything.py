@@ -28,7 +28,7 @@ from nonlinear import commands
 from tests import refusals
 
 SEED = 18
-INPUTS = {"command": 12, "history": 100, "mat": 25, "study": 100}  # by the first word of a target's name
+INPUTS = {"command": 12, "history": 100, "mat": 50, "study": 100}  # by the first word of a target's name
 LINES = 100  # of the target "command line"
 USUAL = 400
 

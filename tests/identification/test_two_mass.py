@@ -157,6 +157,8 @@ def test_what_the_design_cannot_hold_is_fixed_or_refused() -> None:
     result = identify_frequency(_design(), record, fixed={"coupling.damping": 0.02})
     assert result.fit["damping"] == 0.02 == result.fit.fixed["damping"].value
     assert read_design_text(result.text).coupling is not None
+    # its N/A times amperes over the motor's rad was taken for a mass
+    refused(identify_frequency, load_design("ballscrew"), record, words=("linear", "of a rotary drive"))
     wrong = {"motor.resistance": 1.0}
     refused(identify_frequency, _design(), record, fixed=wrong, words="can be fixed here")
     blind = replace(record, signals={name: v for name, v in record.signals.items() if name != "angle"})

@@ -8,6 +8,7 @@ import pytest
 
 from actuator_lti.design import load_design, read_design_text, write_design
 from actuator_lti.design.model import Design
+from actuator_lti.errors import InputError
 from analyses.identification.campaign import CampaignResult, campaign_items, identify_campaign
 from analyses.identification.surface import PATHS, contributions, fit_surface
 from analyses.identification.to_design import design_with_fit
@@ -160,6 +161,8 @@ def test_a_richer_law_is_found_and_an_outlier_named(design, runs) -> None:
     assert not per_direction.warranted
     strange = tuple(replace(r, current_A=r.current_A * (1.05 if r.id == "30" else 1.0)) for r in runs)
     imported = _imported(strange, 5)
+    with pytest.raises(InputError, match="a campaign is of a rotary drive"):  # told in N m and rad/s
+        identify_campaign(imported, load_design("ballscrew"))
     found = identify_campaign(imported, design, richer=False)
     kept = found.fit
     assert [outlier.run for outlier in kept.outliers] == ["30"]

@@ -254,7 +254,7 @@ def test_what_is_no_law_is_refused_in_words(tmp_path: Path) -> None:
     assert "current, velocity, position" in made(unit, stage="torque")
     for system, inputs in ((unit, ["sped"]), (unit, None), (control.ss(*unit), None), (unit, "error")):
         assert "allowed: a list of command, error, speed" in made(system, inputs)
-    assert "B = other sizes: allowed: 1 x 2, with 2 inputs" in made(unit, ["error", "speed"])
+    assert "B = other sizes: allowed: 1 x 2, with 2 inputs" in made(unit, np.array(["error", "speed"]))
     assert 'inputs = "omega": allowed' in made(unit, ["error", "omega"])
     assert "continuous: sampled, dt = 0.0001" in made(unit, continuous=unit)
     assert "continuous: allowed: without method" in made(unit[:4], method="tustin", continuous=unit[:4])

@@ -129,7 +129,10 @@ def test_what_8_ulp_decide_is_withheld() -> None:
     assert (m.stable, m.verdict) == (None, "undecided")
     assert (m.gain_margin_db, m.phase_margin_deg, m.delay_margin_s, m.modulus_margin) == (None,) * 4
     assert "evidence: withheld" in str(m)
-    late = stability_margins(control.tf([1e-15], den, PERIOD_S), delay_s=0.3 * PERIOD_S)
+    limit = stability_margins(control.tf([1.0], [1.0, -0.5], PERIOD_S), delay_s=0.3 * PERIOD_S).gain_margins[
+        0
+    ]
+    late = stability_margins(control.tf([limit.ratio], [1.0, -0.5], PERIOD_S), delay_s=0.3 * PERIOD_S)
     assert late.evidence == "withheld"
     assert "not resolved in double precision" in late.evidence_reason
 

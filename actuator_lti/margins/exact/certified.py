@@ -13,7 +13,7 @@ from actuator_lti.errors import InputError
 from actuator_lti.margins.assemble import Figures, assembled
 from actuator_lti.margins.distances import DISK, MODULUS
 from actuator_lti.margins.exact.crossings import crossings, smallest
-from actuator_lti.margins.exact.decided import ACROSS, UNRESOLVED, Shared, hidden_notes, settled
+from actuator_lti.margins.exact.decided import ACROSS, COUNTED, UNRESOLVED, Shared, hidden_notes, settled
 from actuator_lti.margins.exact.loop import ExactLoop, exact_loop, neighbours
 from actuator_lti.margins.exact.roots import within
 from actuator_lti.margins.given import ULP, Given
@@ -23,7 +23,6 @@ from actuator_lti.types import Complex, Mask, Real
 
 _METHOD = "roots of exact polynomials, isolated in certified intervals; no grid"
 _GIVEN = "exact arithmetic on the given doubles"
-_COUNTED = f"{UNRESOLVED}how many closed-loop poles are unstable; some are"
 _SHARP = 1e-3  # a pole is placed where its own error is below this part of its modulus
 _RESOLVED = 1e-6  # of the modulus of half of the poles: one that is smaller is far slower
 _MANY = 2.0  # a modulus below which half of the poles lie, where counting shows it
@@ -41,7 +40,7 @@ def certified_margins(given: Given, band_rad_s: tuple[float, float] | None = Non
     if below and abs(above + below) <= abs(below) * 2 * ULP // (1 << 53):
         raise InputError("1 + L is zero at infinite frequency: the closed loop is not well posed")
     others = neighbours(given, loop)
-    poles, hidden, figures = _poles(given, loop, others), loop.hidden_modes, None
+    poles, hidden, figures = _poles(loop, others), loop.hidden_modes, None
     found = Shared((), ())
     if poles.problem is None:
         found = settled(lambda merge: [crossings(each, loop, merge) for each in (loop, *others)])
@@ -75,12 +74,12 @@ class _Poles:
     note: str = ""  # what of these numbers double precision does not resolve
 
 
-def _poles(given: Given, base: ExactLoop, others: list[ExactLoop]) -> _Poles:
+def _poles(base: ExactLoop, others: list[ExactLoop]) -> _Poles:
     counts = {(f.unstable, f.at_limit, f.hidden_modes.at_zero) for f in (base, *others)}
     if len(counts) == 1 and not _slow(base):
         return _Poles(*counts.pop())
     closed = _values(base, closed=True)
-    return _by_movement(base, others, closed, scattered=given.A is None and base.sampled)
+    return _by_movement(base, others, closed)
 
 
 def _slow(loop: ExactLoop) -> bool:
@@ -100,13 +99,12 @@ def _values(loop: ExactLoop, closed: bool) -> Complex:
     return np.array(seen.values + loop.hidden_modes.values, dtype=complex)
 
 
-def _by_movement(base: ExactLoop, others: list[ExactLoop], closed: Complex, scattered: bool) -> _Poles:
+def _by_movement(base: ExactLoop, others: list[ExactLoop], closed: Complex) -> _Poles:
     """Count with each pole's own error: how far it moves among the neighbours.
 
     At the limit is a pole that lies there exactly; one that the neighbours only carry across it may lie on
-    either side, which is no answer, unless others lie in the right half plane whatever is meant (of
-    coefficients in z, which scatter all poles near one, that is not asked: their crossings are hardly ever
-    resolved). A hidden mode at zero frequency alone is known by its place.
+    either side, which is no answer, unless others lie in the right half plane whatever is meant. A hidden
+    mode at zero frequency alone is known by its place.
     """
     radius = _movements(closed, [_values(f, closed=True) for f in others])
     size, exact = np.abs(closed), _exactly_at_limit(base, closed)
@@ -116,8 +114,8 @@ def _by_movement(base: ExactLoop, others: list[ExactLoop], closed: Complex, scat
     at_dc = near & ((radius > _SHARP * size) | (size == 0.0)) & (radius <= _SHARP * np.array(beyond))
     unsure, hidden = int(np.count_nonzero(at_dc & ~exact)), int(np.count_nonzero(at_dc))
     across = bool(np.count_nonzero(near & ~exact & ~at_dc))
-    if unstable and not scattered and (across or unsure > 1):
-        return _Poles(base.unstable, base.at_limit, base.hidden_modes.at_zero, note=_COUNTED)
+    if unstable and (across or unsure > 1):
+        return _Poles(base.unstable, base.at_limit, base.hidden_modes.at_zero, note=COUNTED)
     if across:
         return _Poles(problem=ACROSS)
     if unsure > 1:  # be they hidden or not

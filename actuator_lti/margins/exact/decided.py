@@ -12,6 +12,7 @@ from actuator_lti.margins.exact.roots import HalfPlanes
 
 UNRESOLVED = "not resolved in double precision: "
 ACROSS = f"{UNRESOLVED}on which side of the stability limit a closed-loop pole lies"
+COUNTED = f"{UNRESOLVED}how many closed-loop poles are unstable; some are"
 _MOVED = 1e-9
 _FAR_DB = 30.0
 _FAR = 10.0 ** (_FAR_DB / 20.0)  # a real-axis crossing farther from -1 than this is of no consequence
