@@ -9,7 +9,7 @@ import numpy as np
 
 from actuator_lti.design.model import Design
 from actuator_lti.design.plant import no_load_speed, reachable_speed
-from actuator_lti.drive.facts import speed_torque_Nm
+from actuator_lti.drive.facts import speed_torque_Nm, stall_torque_Nm
 from actuator_lti.drive.profile import command_mean
 from actuator_lti.drive.steady import steady_input
 from actuator_lti.errors import InputError, NumericalError
@@ -103,13 +103,15 @@ def triangle_start(design: Design, rows: Rows, amplitude_rad: np.ndarray, limite
     """Begin sines that are ``limited`` and far beyond the speed limit on the flank of their triangle.
 
     A triangle finds its mean only slowly, by a factor of about (x - 1)/(x + 1) each half period, x = w A/R.
+    None where a quarter period from rest is too short for the limit: parabolas (model.md, section 5).
     """
     limit = design.limits.speed_rad_s
     if design.controller.velocity is None or not limit < no_load_speed(design):
         return
     rate, omega = limit / design.total_ratio, 2.0 * np.pi * rows.frequency_hz()
     x = omega * amplitude_rad / rate
-    which = np.flatnonzero((x >= FULL_TRIANGLE) & limited)
+    push = min(float(stall_torque_Nm(design)) / design.inertia_kgm2, design.limits.acceleration_rad_s2)
+    which = np.flatnonzero((x >= FULL_TRIANGLE) & limited & (omega * limit <= 0.5 * np.pi * push))
     lag = np.arccos(np.pi / (2.0 * x[which]))
     rows["angle_start"][which] = -limit * lag / omega[which]
     rows["speed_start"][which] = rows["speed_command_start"][which] = limit

@@ -29,7 +29,7 @@ from analyses.large_signal.map import (
 from analyses.large_signal.result import ROUNDS, limit_shift
 from analyses.linear.loop_figures import all_loop_figures
 from analyses.validation.places import Bench
-from nonlinear import commands, simulate
+from nonlinear import Rows, commands, simulate
 from reports.sections.large_signal import _result, _sawtooth
 from reports.sections.names import output_unit
 from tests.changed import changed
@@ -431,6 +431,16 @@ def test_a_full_triangle_of_a_loop_without_an_integral_is_that_of_a_run_from_res
     turn = np.exp(-2j * np.pi * one.cycles * np.arange(one.ticks) / one.ticks)
     seen = 2.0 * abs(np.mean(rest.output_angle_rad[-one.ticks :] * turn))
     assert abs(run.phasor("output_angle_rad")[0]) == pytest.approx(seen, rel=1e-3)
+
+
+def test_no_sine_begins_in_a_triangle_that_the_torque_cannot_turn() -> None:
+    """A train of parabolas of the acceleration a has the speed a T/4, here 1 % above the limit, and below."""
+    design = changed(AMBER, limits={"acceleration_rad_s2": np.inf})
+    limits, rows = design.limits, Rows.of(design, 2)
+    push = design.motor.torque_constant_Nm_A * limits.peak_current_A / design.inertia_kgm2
+    rows.sine("command", 1.0, push / (4.0 * limits.speed_rad_s * np.array([1.01, 0.99])))
+    tones.triangle_start(design, rows, np.full(2, 10.0), np.ones(2, dtype=bool))
+    assert list(rows["speed_start"]) == [limits.speed_rad_s, 0.0]
 
 
 def test_the_bandwidth_of_the_map_is_that_of_the_output() -> None:
