@@ -11,9 +11,10 @@ from actuator_lti.asked.quantities import QUANTITIES, with_unit
 from actuator_lti.design.checks_control import CONTROL_CHECKS
 from actuator_lti.design.checks_plant import FIRST_RELATIONS, PLANT_CHECKS, with_stand_ins
 from actuator_lti.design.field import Field, Structure
-from actuator_lti.design.fields import FIELDS, TABLES, at_place, fields_in, part_at, parts_of, template_of
+from actuator_lti.design.fields import FIELDS, TABLES, at_place, fields_in, parts_of, template_of
 from actuator_lti.design.mistakes import UNREAD, Check, Findings, Refusal, UnreadError, printed, readable
 from actuator_lti.design.model import Correlation, Design, Requirement
+from actuator_lti.design.rule import value_of
 from actuator_lti.files.reading import shown
 
 _NUMBER = re.compile(r"[-+]?[0-9.]+(e[-+]?[0-9]+)?\Z")
@@ -92,7 +93,7 @@ def _most(design: Design) -> Iterator[Refusal]:
 
 
 def _bounded(field: Field, bound: Callable[[Design], tuple[float, str]], design: Design) -> Iterator[Refusal]:
-    value, unit = getattr(part_at(design, field.section), field.attribute), field.unit(Structure.of(design))
+    value, unit = value_of(design, field.path), field.unit(Structure.of(design))
     (most, why), unit = bound(design), "" if unit == "1" else f" {unit}"
     if value > most:
         yield field.path, f"{value:g}{unit}", f"{why}; allowed: at most {most:.4g}{unit}"

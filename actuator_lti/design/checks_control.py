@@ -2,13 +2,15 @@
 
 from collections.abc import Iterator
 from math import inf, pi
-from typing import Any, get_args
+from operator import attrgetter
+from typing import get_args
 
 from actuator_lti.design.control import FEED_FORWARD, FILTER_KEYS, Filter, FilterPlace, stable_pair
-from actuator_lti.design.fields import FIELDS, Field, axis_unit, fields_in, part_at
+from actuator_lti.design.fields import Field, axis_unit, fields_in
 from actuator_lti.design.law import BESIDE_A_LAW, MOST_STATES, Law
-from actuator_lti.design.mistakes import UNREAD, Check, Refusal, Rule, readable
+from actuator_lti.design.mistakes import UNREAD, Check, Refusal, readable
 from actuator_lti.design.model import Design
+from actuator_lti.design.rule import Rule, as_said, value_of
 
 MAX_FILTERS = 8  # of each place; the running drive has room for so many second-order sections
 _BELOW_NYQUIST = ("frequency_rad_s", "zero_rad_s", "pole_rad_s")
@@ -59,24 +61,18 @@ def _filter_count(design: Design) -> Iterator[Refusal]:
 def _tracking(design: Design) -> Iterator[Refusal]:
     encoder, w0 = design.encoder, design.encoder.bandwidth_rad_s
     most = TRACKING_LIMIT / design.controller.period_of("velocity")
-    if encoder.speed != "tracking" and w0 is not None:
-        yield "encoder.bandwidth", f"{w0:g}", 'allowed with speed = "tracking"'
-    elif encoder.speed == "tracking" and w0 is None:
-        yield "encoder.speed", '"tracking"', 'needs encoder.bandwidth, such as bandwidth = "300 Hz"'
-    elif w0 is not None and w0 >= most:
+    if encoder.speed == "tracking" and w0 is not None and w0 >= most:
         allowed = f"too fast for its period of {TRACKING_LIMIT / most:g} s; allowed: below {most:.6g} rad/s"
         yield "encoder.bandwidth", f"{w0:.6g} rad/s", allowed
 
 
-def _windup(design: Design) -> Iterator[Refusal]:
-    for name in ("velocity", "current"):
-        if (loop := getattr(design.controller, name)) is None:
-            continue
-        if loop.integral_time_s is None and loop.anti_windup != "conditional":
-            yield f"control.{name}.anti_windup", f'"{loop.anti_windup}"', "needs integral_time"
-        if loop.tracking_time_s is not None and loop.anti_windup != "back-calculation":
-            allowed = 'allowed with anti_windup = "back-calculation"'
-            yield f"control.{name}.tracking_time", f"{loop.tracking_time_s:g} s", allowed
+def _windup(stage: str) -> tuple[Rule, Rule]:
+    back, loop = "back-calculation", attrgetter(f"controller.{stage}")
+    key, also = f"control.{stage}.anti_windup", f'allowed with anti_windup = "{back}"'
+    return (
+        Rule(key, "needs integral_time", lambda d: loop(d).integral_time_s is None),
+        Rule(f"control.{stage}.tracking_time", also, lambda d: loop(d).anti_windup != back),
+    )
 
 
 def _multiples(design: Design) -> Iterator[Refusal]:
@@ -87,61 +83,27 @@ def _multiples(design: Design) -> Iterator[Refusal]:
         yield "control.position.every", n_p, f"allowed: a multiple of control.velocity.every = {n_v}"
 
 
-def _fed_forward(key: str) -> Rule:
-    return Rule(
-        f"control.position.{key}", f"{{d.controller.position.{key}:g}}", "allowed: 0 without a velocity loop",
-        lambda d: d.controller.velocity is None and getattr(d.controller.position, key, 0.0)
-    )  # fmt: skip
-
-
-# of a key of the command: the key that it needs, the limit that it has to keep
-_PROFILE = {"rate": ("", "speed"), "acceleration": ("rate", "acceleration"), "jerk": ("acceleration", "")}
-
-
 def _command_filter(design: Design) -> Iterator[Refusal]:
     control, filter_time_s = design.controller, design.command.filter_time_s
     period_s = control.period_of(control.outermost)
     if 0.0 < filter_time_s <= period_s / pi:
         allowed = f"allowed: 0, or above T/pi of the outermost loop, {period_s / pi:.6g} s"
-        yield _written(design, "filter_time", filter_time_s, allowed)
+        yield "command.filter_time", as_said(design, "command.filter_time"), allowed
 
 
-def _command(design: Design) -> Iterator[Refusal]:
-    for key, (outer, limiter) in _PROFILE.items():
-        value = _of(design, f"command.{key}")
-        yield from readable(_needed(design, key, value, outer))
-        yield from readable(_slow_enough(design, key, value, limiter))
+def _slow_enough(design: Design) -> Iterator[Refusal]:
+    for key, limiter in (("rate", "speed"), ("acceleration", "acceleration")):
+        yield from readable(_within(design, f"command.{key}", f"limits.{limiter}"))
 
 
-def _of(design: Design, path: str) -> Any:
-    return getattr(part_at(design, FIELDS[path].section), FIELDS[path].attribute)
-
-
-def _needed(design: Design, key: str, value: float, outer: str) -> Iterator[Refusal]:
-    if value == inf:
-        return
-    if design.controller.position is None:
-        yield _written(design, key, value, "allowed with a position loop")
-    if outer and _of(design, f"command.{outer}") == inf:
-        yield _written(design, key, value, f"needs command.{outer}")
-
-
-def _slow_enough(design: Design, key: str, value: float, limiter: str) -> Iterator[Refusal]:
-    limit, ratio = _of(design, f"limits.{limiter}") if limiter else inf, design.total_ratio
+def _within(design: Design, path: str, limiter: str) -> Iterator[Refusal]:
+    value, limit, ratio = value_of(design, path), value_of(design, limiter), design.total_ratio
     if limit * (1 + 1e-9) < value * ratio < inf:
-        unit = axis_unit(design.axis, f"command.{key}")
+        unit = axis_unit(design.axis, path)
         most = f"{limit / ratio:.6g} {unit}"
         if design.axis == "rotary":
             most += f" ({limit / ratio * (180.0 / pi):.6g} {unit.replace('rad', 'deg')})"
-        allowed = f"faster than limits.{limiter}; allowed: at most {most} at the output"
-        yield _written(design, key, value, allowed)
-
-
-def _written(design: Design, key: str, value: float, allowed: str) -> Refusal:
-    path = f"command.{key}"
-    parameter = design.parameters.get(path)
-    text = f"{value:.6g} {axis_unit(design.axis, path)}" if parameter is None else parameter.text
-    return path, text, allowed
+        yield path, as_said(design, path), f"faster than {limiter}; allowed: at most {most} at the output"
 
 
 def _jitter(design: Design) -> Iterator[Refusal]:
@@ -224,11 +186,19 @@ def _matrices(law: Law, path: str) -> Iterator[Refusal]:
 
 CONTROL_CHECKS: tuple[Check, ...] = (
     _multiples,
-    Rule("control.computing_delay", "{d.controller.computing_delay_s:g} s",
-         "allowed: at most 100 ticks of {d.controller.period_s:g} s",
+    Rule("control.computing_delay", "allowed: at most 100 ticks of {d.controller.period_s:g} s",
          lambda d: d.controller.computing_delay_s > 100 * d.controller.period_s),
-    _filters, _filter_count, _tracking, _windup,
-    *map(_fed_forward, FEED_FORWARD),
-    _command, _command_filter, _laws, _jitter,
+    _filters, _filter_count,
+    Rule("encoder.bandwidth", 'allowed with speed = "tracking"', lambda d: d.encoder.speed != "tracking"),
+    Rule("encoder.speed", 'needs encoder.bandwidth, such as bandwidth = "300 Hz"',
+         lambda d: d.encoder.speed == "tracking" and d.encoder.bandwidth_rad_s is None),
+    _tracking, *_windup("velocity"), *_windup("current"),
+    *(Rule(f"control.position.{key}", "allowed: 0 without a velocity loop",
+           lambda d: d.controller.velocity is None) for key in FEED_FORWARD),
+    *(Rule(f"command.{key}", "allowed with a position loop", lambda d: d.controller.position is None)
+      for key in ("rate", "acceleration", "jerk")),
+    Rule("command.acceleration", "needs command.rate", lambda d: d.command.rate_rad_s == inf),
+    Rule("command.jerk", "needs command.acceleration", lambda d: d.command.acceleration_rad_s2 == inf),
+    _slow_enough, _command_filter, _laws, _jitter,
 )  # fmt: skip
 """Each gives the settings that contradict each other: key, value, what is allowed."""

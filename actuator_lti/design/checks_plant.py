@@ -3,13 +3,15 @@
 import re
 from collections.abc import Iterator
 from dataclasses import replace
+from functools import partial
 from math import inf, isclose, log
 from typing import Any
 
 from actuator_lti.design.fields import FIELDS, axis_unit, part_at
-from actuator_lti.design.mistakes import UNREAD, Check, Refusal, Rule, printed, readable
+from actuator_lti.design.mistakes import UNREAD, Check, Refusal, printed, readable
 from actuator_lti.design.model import Design
 from actuator_lti.design.plant import MotorConstants
+from actuator_lti.design.rule import Rule, value_of
 from actuator_lti.design.spellings import split_quantity
 
 MAX_MAP_POINTS = 16  # of each direction
@@ -196,11 +198,7 @@ def _no_gear(design: Design, path: str, attribute: str) -> Iterator[Refusal]:
 def _locking(design: Design) -> Iterator[Refusal]:
     """A self-locking stage behind the coupling, or whose friction would give energy."""
     coupling, locking = design.coupling, design.load.locking_gear
-    if coupling is None:
-        return
-    if design.load.path != "self-locking":
-        if locking is not None:
-            yield "load.locking_gear", f'"{locking}"', 'allowed with load.path = "self-locking"'
+    if coupling is None or design.load.path != "self-locking":
         return
     names = [gear.name for gear in design.gears]
     locks = names.index(locking) + 1 if locking else len(names)
@@ -217,19 +215,11 @@ def _locking(design: Design) -> Iterator[Refusal]:
         yield "friction.load_coefficient", f"{coefficient:g}", allowed
 
 
-def _bends(design: Design) -> Iterator[Refusal]:
-    coupling = design.coupling
-    if coupling is None:
-        return
-    for number, (torque, stiffness) in enumerate(coupling.bends, 1):
-        key, beside = f"coupling.torque_{number}", f"coupling.stiffness_{number + 1}"
-        if (torque is None) != (stiffness is None):
-            given, missing = (key, beside) if stiffness is None else (beside, key)
-            yield given, f"{torque or stiffness:g}", f"allowed with {missing} beside it"
-    first, second = coupling.torque_1_Nm, coupling.torque_2_Nm
-    if second is not None and (first is None or first >= second):
-        allowed = "above coupling.torque_1" if first is not None else "with coupling.torque_1"
-        yield "coupling.torque_2", f"{second:g}", f"allowed: {allowed}"
+_BENDS = (("torque_1", "stiffness_2"), ("torque_2", "stiffness_3"))
+
+
+def _unsaid(path: str, design: Design) -> bool:
+    return value_of(design, path) is None
 
 
 def _friction_points(design: Design) -> Iterator[Refusal]:
@@ -249,52 +239,43 @@ def _friction_points(design: Design) -> Iterator[Refusal]:
 FIRST_RELATIONS: tuple[Check, ...] = (check_place, check_temperature, check_motor)
 """Those whose refusals leave an inertia or the motor's constants open."""
 _SOURCE = "not allowed with motor.source_gain, which "
-_PEAK_TIME = ("limits.peak_time", "{d.limits.peak_time_s:g} s")
 PLANT_CHECKS: tuple[Check, ...] = (
-    Rule("control.current", "a table", f"{_SOURCE}has no current",
-         lambda d: d.controller.current is not None and not d.motor.has_electrical_dynamics),
-    Rule("supply", "a table", f"{_SOURCE}draws no current",
-         lambda d: d.supply is not None and not d.motor.has_electrical_dynamics),
-    Rule("temperature", "a table", f"{_SOURCE}has no winding",
-         lambda d: d.temperature is not None and not d.motor.has_electrical_dynamics),
-    Rule(*_PEAK_TIME, "needs a current loop, [control.current]",
-         lambda d: d.limits.peak_time_s is not None and d.controller.current is None),
-    Rule(*_PEAK_TIME, "needs limits.peak_current and limits.continuous_current",
-         lambda d: d.limits.peak_time_s is not None
-         and (d.limits.peak_current_A == inf or d.limits.continuous_current_A == inf)),
-    Rule(*_PEAK_TIME, "allowed: with peak_current above continuous_current",
-         lambda d: d.limits.peak_time_s is not None
-         and d.limits.peak_current_A <= d.limits.continuous_current_A < inf),
-    Rule("supply.brake_voltage", "{d.supply.brake_voltage_V:g} V",
-         "allowed: at least limits.voltage = {d.limits.voltage_V:g} V",
-         lambda d: d.supply is not None and d.supply.brake_voltage_V is not None
-         and d.supply.brake_voltage_V < d.limits.voltage_V),
-    Rule("supply.capacitance", "{d.supply.capacitance_F:g}", "allowed with regenerative = false",
-         lambda d: d.supply is not None and d.supply.regenerative and d.supply.capacitance_F is not None),
-    Rule("supply.brake_voltage", "{d.supply.brake_voltage_V:g}", "allowed with regenerative = false",
-         lambda d: d.supply is not None and d.supply.regenerative and d.supply.brake_voltage_V is not None),
-    Rule("supply.regenerative", "false", "needs supply.capacitance, which takes the energy",
-         lambda d: d.supply is not None and not d.supply.regenerative and d.supply.capacitance_F is None),
-    Rule("load.gravity", "a table", "allowed on a rotary axis; a linear one takes a constant load",
-         lambda d: d.load.gravity is not None and d.axis == "linear"),
-    Rule("friction.dry_torque", "{d.friction.dry_torque_Nm:g}", "not allowed beside friction.point",
-         lambda d: d.friction.points and d.friction.dry_torque_Nm),
-    Rule("friction.viscous", "{d.friction.viscous_Nms_rad:g}", "not allowed beside friction.point",
-         lambda d: d.friction.points and d.friction.viscous_Nms_rad),
-    Rule("friction.law", '"{d.friction.law}"', 'allowed with friction.point: "coulomb"',
-         lambda d: d.friction.points and d.friction.law != "coulomb"),
+    Rule("control.current", f"{_SOURCE}has no current", lambda d: not d.motor.has_electrical_dynamics),
+    Rule("supply", f"{_SOURCE}draws no current", lambda d: not d.motor.has_electrical_dynamics),
+    Rule("temperature", f"{_SOURCE}has no winding", lambda d: not d.motor.has_electrical_dynamics),
+    Rule("limits.peak_time", "needs a current loop, [control.current]",
+         lambda d: d.controller.current is None),
+    Rule("limits.peak_time", "needs limits.peak_current and limits.continuous_current",
+         lambda d: inf in (d.limits.peak_current_A, d.limits.continuous_current_A)),
+    Rule("limits.peak_time", "allowed: with peak_current above continuous_current",
+         lambda d: d.limits.peak_current_A <= d.limits.continuous_current_A < inf),
+    Rule("supply.brake_voltage", "allowed: at least limits.voltage = {d.limits.voltage_V:g} V",
+         lambda d: d.supply.brake_voltage_V < d.limits.voltage_V),
+    Rule("supply.capacitance", "allowed with regenerative = false", lambda d: d.supply.regenerative),
+    Rule("supply.brake_voltage", "allowed with regenerative = false", lambda d: d.supply.regenerative),
+    Rule("supply.regenerative", "needs supply.capacitance, which takes the energy",
+         lambda d: d.supply.capacitance_F is None),
+    Rule("load.gravity", "allowed on a rotary axis; a linear one takes a constant load",
+         lambda d: d.axis == "linear"),
+    Rule("friction.dry_torque", "not allowed beside friction.point", lambda d: d.friction.points),
+    Rule("friction.viscous", "not allowed beside friction.point", lambda d: d.friction.points),
+    Rule("friction.law", 'allowed with friction.point: "coulomb"', lambda d: d.friction.points),
     _friction_points,
-    Rule("load.friction", "a table", "allowed behind a coupling; a rigid drive has friction alone",
-         lambda d: d.coupling is None and d.load.friction),
-    Rule("coupling.stiffness", "{d.coupling.stiffness_Nm_rad:g}",
+    Rule("load.friction", "allowed behind a coupling; a rigid drive has friction alone",
+         lambda d: d.coupling is None),
+    Rule("coupling.stiffness",
          "allowed with an inertia behind it; load.inertia, or that of a gear behind it, is missing",
-         lambda d: d.coupling is not None and d.load_side_inertia_kgm2 <= 0.0),
-    _bends,
-    Rule("friction.law", '"tanh"', 'allowed with a coupling: "coulomb"',
-         lambda d: d.coupling is not None and d.friction.law == "tanh"),
+         lambda d: d.load_side_inertia_kgm2 <= 0.0),
+    *(Rule(f"coupling.{one}", f"allowed with coupling.{other} beside it",
+           partial(_unsaid, f"coupling.{other}")) for pair in _BENDS for one, other in (pair, pair[::-1])),
+    Rule("coupling.torque_2", "allowed: with coupling.torque_1", partial(_unsaid, "coupling.torque_1")),
+    Rule("coupling.torque_2", "allowed: above coupling.torque_1",
+         lambda d: d.coupling.torque_1_Nm is not None and d.coupling.torque_1_Nm >= d.coupling.torque_2_Nm),
+    Rule("friction.law", 'allowed with a coupling: "coulomb"', lambda d: d.coupling is not None),
+    Rule("load.locking_gear", 'allowed with load.path = "self-locking"',
+         lambda d: d.coupling is not None and d.load.path != "self-locking"),
     _locking,
-    Rule("limits.continuous_current", "{d.limits.continuous_current_A:g} A",
-         "allowed: at most limits.peak_current = {d.limits.peak_current_A:g} A",
+    Rule("limits.continuous_current", "allowed: at most limits.peak_current = {d.limits.peak_current_A:g} A",
          lambda d: d.limits.peak_current_A < d.limits.continuous_current_A < inf),
 )  # fmt: skip
 """Each gives the settings that contradict each other: key, value, what is allowed."""

@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import dataclass
 from difflib import get_close_matches
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -75,20 +74,6 @@ def readable(items: Iterable[T]) -> Iterator[T]:
         yield from items
     except UnreadError:
         return
-
-
-@dataclass(frozen=True)
-class Rule:
-    """What a design must not be: the key that is refused then, its value as shown, and what is allowed."""
-
-    key: str
-    given: str  # shows values of the design ``d``, as ``{d.limits.voltage_V:g}``; so does what is allowed
-    allowed: str
-    broken: Callable[[Design], Any]
-
-    def __call__(self, design: Design) -> Iterator[Refusal]:
-        if self.broken(design):
-            yield self.key, self.given.format(d=design), self.allowed.format(d=design)
 
 
 class Findings:

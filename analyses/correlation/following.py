@@ -16,6 +16,11 @@ from analyses.records.driven_motion import ratio_of
 from analyses.records.record import Record
 
 PLACES = ("angle", "output_angle", "position")
+LIMITED = {
+    "current": ("limits.peak_current", "A"), "speed": ("limits.speed", "rad/s"),
+    "velocity": ("limits.speed", "m/s"),
+}  # fmt: skip
+"""What a limit of a drive shows in, its key and unit."""
 
 
 @dataclass(frozen=True)
@@ -26,7 +31,7 @@ class Followed:
     cosine: float  # correlation of the recorded motion with the simulated one
     clock: float  # of the following error, recorded over simulated
     off: float = 0.0  # of what the position has too much of the motion
-    limit: str = ""  # the largest current, where the loops take far more of it for the same command
+    limit: str = ""  # of the drive, where the loops take far more of a signal for the same command
     place: str = ""  # the signal that it is of
     lags: bool = True  # the simulated following error makes its speed, whatever the drive's torque
     zero: float = 0.0  # of the place from that of its command, rad (m), where that is most of what is off
@@ -39,12 +44,14 @@ class Followed:
     @property
     def words(self) -> str:
         """What is off, by how much, and by what."""
+        limit = f", or {self.limit}" * bool(self.limit)
         if self.zero:
             unit = "m" if self.place == "position" else "rad"
             why = f"the zero of the {self.place} is {self.zero:.4g} {unit} from that of its command"
             return f"{why}: offset of its column in a record file"
         if self.cosine < COSINE:
-            return f"the motion is not that of the command (correlation {self.cosine:.2f})"
+            other = f": another command{limit}" * bool(limit)
+            return f"the motion is not that of the command (correlation {self.cosine:.2f}){other}"
         scale = "counts a revolution, the reduction, or a unit"
         what, ratio, of = "motion", 1.0 + self.clock, "which the loops make of the commanded speed"
         cause = f"the clock, {scale}"
@@ -54,8 +61,8 @@ class Followed:
         elif self.stage == "position":
             what, of = "following error", "of the design's loops at this motion"
             clock = f"a clock about {100.0 * self.clock:+.2g} % off, " * (ratio > 0.0)
-            cause = f"{clock}a command logged early or late, {self.limit or 'or another gain'}"
-        return f"the {what} is {ratio:.4g} times that {of}: {cause}"
+            cause = f"{clock}a command logged early or late, or another gain"
+        return f"the {what} is {ratio:.4g} times that {of}: {cause}{limit}"
 
 
 def followed(
@@ -101,12 +108,16 @@ def followed(
 
 
 def _limit(recorded: Mapping[str, Floats], simulated: Mapping[str, Floats]) -> str:
-    """A limit of the drive that the design does not have; empty where the currents tell of none."""
-    most = [float(np.max(np.abs(one["current"]))) for one in (recorded, simulated) if "current" in one]
-    if len(most) < 2 or most[1] <= OVER * most[0]:
-        return ""
-    why = f"the current stays below {most[0]:.3g} A, the design's loops take up to {most[1]:.3g} A"
-    return f"another gain, or a lower limit of the current (limits.peak_current): {why}"
+    """A limit of the drive that the design does not have: of what is longest near its largest value."""
+    reasons = dict[float, str]()
+    for name, (key, unit) in LIMITED.items():
+        sizes = [np.abs(one[name]) for one in (recorded, simulated) if name in one]
+        if len(sizes) == 2 and (most := sizes[0].max()) < (would := sizes[1].max()) / OVER:
+            why = (
+                f"the {name} stays below {most:.3g} {unit}, the design's loops take up to {would:.3g} {unit}"
+            )
+            reasons[float(np.mean(sizes[0] > most / OVER))] = f"a lower limit of the {name} ({key}): {why}"
+    return reasons[max(reasons)] if reasons else ""
 
 
 def moved_by_clock(driven: Driven, record: Record, place: str, model: Floats) -> Floats | None:

@@ -6,12 +6,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from scipy.optimize import brentq
 from scipy.special import stdtrit
 
 from actuator_lti.design import parameter_value
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
+from actuator_lti.systems.root import root
 from actuator_lti.types import Floats, Progress
 from analyses.estimation.fit import COVERAGE, Fit, Fixed
 from analyses.estimation.least_squares import RESOLVED, identifiable
@@ -41,44 +41,55 @@ class _Side:
     best: Point
     k: int
     level: float
-    straight: Floats  # coordinates over that distance, of a straight response
+    side: float  # -1 or 1
     most: float  # how far is looked
     bound: float  # the end of the interval where the deviation is below its level there
 
-    def fitted(self, begin: Point, at: float) -> tuple[Floats, float]:
-        """The others fitted again, and the deviation over its level."""
+    def further(self, near: Point, distance: float) -> Point:
+        """A point by so much beyond another, the others as a straight response would have them there."""
+        return self.search.at(near.x + distance * self.side * near.along(self.k))
+
+    def fitted(self, begin: Point) -> Point:
+        """The others fitted again; what is left is without bound where what fits better grows."""
         there = self.search.least(begin, enough=ROUGH, hold=self.k)
-        if there.cost < self.best.cost - CLOSE * self.level**2:
-            if self.search.rank(there) > self.search.rank(self.best):  # it grows: the interval ends before
-                return there.x, np.inf
-            raise _Lower(there.x)
-        return there.x, float(np.sqrt(max(there.cost - self.best.cost, 0.0))) / self.level
+        if not there.cost < self.best.cost - CLOSE * self.level**2:
+            return there
+        if self.search.rank(there) > self.search.rank(self.best):
+            return replace(there, rest=np.full_like(there.rest, np.inf))
+        raise _Lower(there.x)
+
+    def off(self, there: Point) -> float:
+        """The deviation over its level."""
+        return float(np.sqrt(max(there.cost - self.best.cost, 0.0))) / self.level
 
     def untold(self) -> bool:
         """Whether values as far as is looked explain the response as well."""
-        return self.fitted(self.search.at(self.best.x + self.most * self.straight), self.most)[1] < 1.0
+        return self.off(self.fitted(self.further(self.best, self.most))) < 1.0
 
     def end(self, guess: float) -> float:
-        """How far the end of the interval is."""
-        path = {0.0: (self.best.x, 0.0)}
+        """How far the end of the interval is: the first that is met on the way out."""
+        path, at = {0.0: self.best}, min(guess, self.most)
+        while at > (low := max(path)):
+            begin = self.further(path[low], at - low)
+            near = begin.cost < self.best.cost + (FAR * self.level) ** 2
+            if not near and at - low > CLOSE * at:
+                at = 0.5 * (low + at)
+                continue
+            path[at] = self.fitted(begin)
+            if self.off(path[at]) > 1.0 - CLOSE:
+                break
+            if at == self.most:
+                return self.bound
+            at = min(2.0 * at, self.most)
 
         def beyond(at: float) -> float:
-            while at not in path:  # the others begin as they are at the point that is nearest
+            if at not in path:  # the others begin as they are at the point that is nearest
                 near = min(path, key=lambda one: abs(one - at))
-                begin = self.search.at(path[near][0] + (at - near) * self.straight)
-                if begin.cost < self.best.cost + (FAR * self.level) ** 2 or abs(at - near) < CLOSE * at:
-                    path[at] = self.fitted(begin, at)
-                else:
-                    beyond(0.5 * (near + at))
-            off = path[at][1] - 1.0
+                path[at] = self.fitted(self.further(path[near], at - near))
+            off = self.off(path[at]) - 1.0
             return 0.0 if abs(off) < CLOSE else off
 
-        low, high = 0.0, min(guess, self.most)
-        while high > 0.0 > beyond(high):
-            if high == self.most:
-                return self.bound
-            low, high = high, min(2.0 * high, self.most)
-        return float(brentq(beyond, low, high, rtol=CLOSE)) if high > 0.0 else 0.0
+        return root(beyond, low, at, CLOSE * at) if at else 0.0
 
 
 def _interval(search: Search, best: Point, k: int, level: float, ranged: bool) -> Floats:
@@ -88,13 +99,12 @@ def _interval(search: Search, best: Point, k: int, level: float, ranged: bool) -
     1988, 6.1). ``ranged``: a factor `REACH` is as far as none. What a straight response would not tell is
     looked at there first, and where one end is not there the other is not looked for.
     """
-    variance, sides = float(best.covariance[k, k]), list[_Side]()
-    guess = level * float(np.sqrt(variance))
+    guess, sides = level * float(np.sqrt(best.covariance[k, k])), list[_Side]()
     for side, edge in zip((-1.0, 1.0), search.box[:, k], strict=True):
         room = float(abs(edge - best.x[k]))
         most = min(room, float(np.log(REACH)) if ranged else REACH * max(abs(best.x[k]), 1.0))
         bound = room if most == room and not ranged else np.inf
-        sides.append(_Side(search, best, k, level, side * best.covariance[k] / variance, most, bound))
+        sides.append(_Side(search, best, k, level, side, most, bound))
     untold = [guess >= one.most and np.isinf(one.bound) and one.untold() for one in sides]
     ends = np.where(untold, np.inf, 0.0) if any(untold) else np.array([one.end(guess) for one in sides])
     return np.array([-1.0, 1.0]) * ends
@@ -178,7 +188,8 @@ def _asked(start: Design, search: Search, joint: Point, level: float) -> tuple[F
     """The ends of all intervals in coordinates, shape (p, 2), or the worst that is not told, and why.
 
     An inertia beside another that is looked for, and a stiffness, are told where their interval has two ends,
-    another value where its standard error is below the design's value, or a quarter of what it is off.
+    another value where its standard error is below the design's value, or a quarter of what it is off; a
+    delay below a tick as well: by what it is off noise would decide which delays are told.
     """
     n, ends = search.count, np.zeros((search.count, 2))
     names, x = search.names[:n], joint.x[:n]
@@ -189,7 +200,8 @@ def _asked(start: Design, search: Search, joint: Point, level: float) -> tuple[F
     std = np.sqrt(np.diag(joint.covariance))[:n]
     own = np.array([parameter_value(start, name) for name in names])
     off = np.abs(search.values(joint.x)[:n] - own)
-    share = std * search.sizes(joint.x) / np.maximum(np.maximum(np.abs(own), off / SURE), 1e-300)
+    tick = [start.controller.period_s if name == "control.computing_delay" else 1e-300 for name in names]
+    share = std * search.sizes(joint.x) / np.max([np.abs(own), off / SURE, tick], axis=0)
     inertia = np.char.endswith(names, "inertia")
     ranged = search.logs[:n] & ~(inertia & (inertia.sum() == 1))
     share[ranged] = level * std[ranged] / np.log(REACH)

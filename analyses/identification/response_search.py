@@ -13,6 +13,7 @@ from scipy.optimize import least_squares
 from actuator_lti.design import parameter_value
 from actuator_lti.design.model import Design
 from actuator_lti.types import Floats, Mask
+from analyses.estimation.least_squares import scaled_lstsq
 from analyses.estimation.parameters import own_share
 from analyses.identification.output_error import LEAST_STEPPED, box_of
 from analyses.identification.response_model import Values
@@ -45,6 +46,13 @@ class Point:
         size = np.linalg.norm(self.slopes, axis=0)
         spread = np.linalg.inv(np.linalg.qr(self.slopes / size, mode="r")) / size[:, None]
         return np.asarray(spread @ spread.T)
+
+    def along(self, k: int) -> Floats:
+        """By how much all move with one of them, as if the response were straight: what it takes up best."""
+        others = np.arange(len(self.x)) != k
+        moved = np.ones(len(self.x))
+        moved[others] = -scaled_lstsq(self.slopes[:, others], self.slopes[:, k])
+        return moved
 
 
 @dataclass(frozen=True, kw_only=True)

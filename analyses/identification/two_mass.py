@@ -1,6 +1,6 @@
 """A two-mass drive from a record of a periodic excitation: lines, their noise, what fits them best."""
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
 
@@ -139,22 +139,21 @@ class TwoMass(Fit):
     @property
     def antiresonance_rad_s(self) -> tuple[float, float]:
         """sqrt(k/J_l), and its standard error."""
-        return self._derived(lambda p: float(np.sqrt(p["stiffness"] / p["load_inertia"])))
+        return self._mode(0.0)
 
     @property
     def resonance_rad_s(self) -> tuple[float, float]:
         """sqrt(k (1/J_l + r/(J_m N_c))), r the reaction (1/N_c without load friction); its standard error."""
-        share = self.reaction / self.reduction
-        return self._derived(
-            lambda p: float(np.sqrt(p["stiffness"] * (1 / p["load_inertia"] + share / p["motor_inertia"])))
-        )
+        return self._mode(self.reaction / self.reduction)
 
-    def _derived(self, of: Callable[[Mapping[str, float]], float]) -> tuple[float, float]:
-        own = {name: self[name] for name in NAMES}
-        middle = of(own)
-        steps = {name: 1e-6 * max(abs(own[name]), 1e-300) for name in self.names}
-        g = np.array([(of({**own, name: own[name] + step}) - middle) / step for name, step in steps.items()])
-        return middle, float(np.sqrt(max(g @ self.covariance @ g, 0.0)))
+    def _mode(self, share: float) -> tuple[float, float]:
+        """sqrt(k (1/J_l + share/J_m)), and its standard error by first derivatives."""
+        load, motor = 1.0 / self["load_inertia"], share / self["motor_inertia"]
+        rate = float(np.sqrt(self["stiffness"] * (load + motor)))
+        shares = {"stiffness": 1.0, "load_inertia": -load / (load + motor)}
+        shares["motor_inertia"] = -motor / (load + motor)
+        g = np.array([0.5 * rate * shares.get(name, 0.0) / self[name] for name in self.names])
+        return rate, float(np.sqrt(max(g @ self.covariance @ g, 0.0)))
 
 
 def angle_responses(

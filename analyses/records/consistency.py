@@ -101,7 +101,7 @@ def check_record(design: Design, record: Record) -> tuple[Finding, ...]:
     """
     design, as_read = record.drive(design), record.as_read or record
     ratio = rate_ratio(design, record)
-    rate, electrical = partial(_rate, ratio), partial(_electrical, abs(_doubt(design, record, ratio)))
+    rate, electrical = partial(_rate, ratio), partial(_electrical, abs(clock_doubt(design, record, ratio)))
     checks = (rate, _still, _time, _clock, _reduction, electrical, _sign, _load, _command, _supply)
     steps = _steps(design, record)  # a row that is lost at full speed looks like a jump
     steps = steps if steps and steps.passed is False else _jumps(design, as_read) or steps
@@ -242,15 +242,11 @@ def _still(design: Design, record: Record) -> Finding | None:
     return Finding(f"{name} against the rate of the {place[0]}", False, text)
 
 
-def clock_doubt(design: Design, record: Record) -> float:
+def clock_doubt(design: Design, record: Record, rate: RateRatio | None = None) -> float:
     """The share by which a record's clock may be off: of its speed, or of its period from whole ticks."""
-    return _doubt(design, record, rate_ratio(design, record))
-
-
-def _doubt(design: Design, record: Record, rate: RateRatio | None) -> float:
-    if rate is not None:
+    if (rate := rate or rate_ratio(design, record)) is not None:
         return rate.doubt
-    ticks = record.period_s / design.controller.period_s
+    ticks, _ = _ticks_a_row(design, record)
     off = ticks / max(round(ticks), 1) - 1.0
     return off if TICK_TOLERANCE < abs(off) <= RATE_TOLERANCE and record.averaged == 1 else 0.0
 

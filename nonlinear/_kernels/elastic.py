@@ -159,7 +159,8 @@ def stride(p, s, number, h):
 
 def put_state(p, s, i, w, W, d, turned):
     """Write the state; the load's angle is what the motor's angle and the twist leave, or as it was."""
-    stands = W == 0.0 and s[at.ES_LOAD_SPEED] == 0.0
+    apart = s[at.ES_CONTACT] == at.GAP  # a load that is pressed goes with the twist, even before it turns
+    stands = s[at.ES_LOAD] == 0.0 or (apart and W == 0.0 and s[at.ES_LOAD_SPEED] == 0.0)
     s[layout.S_CURRENT], s[layout.S_SPEED], s[at.ES_LOAD_SPEED], s[at.ES_TWIST] = i, w, W, d
     s[layout.S_ANGLE] += turned
     if not stands:

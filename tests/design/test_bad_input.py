@@ -44,7 +44,7 @@ CASES = [  # a text, another in its place, and what is said of it
      "motor.back_emf_constant = 0.007 V*s/rad (7 mV*s/rad)", "within 10 % of 0.0059 V*s/rad"),
     ("[encoder]", '[encoder]\nbandwidth = "300 rad/s"',
      "encoder.bandwidth = 300 rad/s:", 'allowed with speed = "tracking"'),
-    (FACTS, '[supply]\ncapacitance = "2 mF"\n[[fact]]', "supply.capacitance = 0.002 F:"),
+    (FACTS, '[supply]\ncapacitance = "2 mF"\n[[fact]]', "supply.capacitance = 2 mF:"),
     ('"self-locking"  #', '"locking"  #', 'load.path = "locking"', '"back-drivable"'),
     ("value = 66", "value = true", "gear.planetary.ratio", "a number"),
     ('revision = "1"', "revision = 1979-05-27", "design.revision", "allowed: text"),

@@ -16,6 +16,7 @@ from actuator_lti.design.access import varied
 from analyses.correlation.asked import Asked
 from analyses.correlation.closed_loop import correlate_record
 from analyses.correlation.compare import compare_signals
+from analyses.correlation.following import LIMITED
 from analyses.correlation.run import Correlation
 from analyses.identification.bench import Settings, identify_bench
 from analyses.identification.to_design import inertia_share
@@ -69,17 +70,21 @@ def test_the_model_of_a_record_tells_its_clock(clock: float, columns: Columns) -
         assert float(off[1]) == pytest.approx(100.0 * (clock - 1.0), rel=0.05)
 
 
-@pytest.mark.parametrize("share", [1.0, 0.4])
-def test_a_drive_limited_to_less_current_than_the_design_says_so(share: float) -> None:
-    """Of the largest current that steps of the command take."""
-    angle = np.where(np.arange(3000) // 500 % 2, 0.02, -0.02)
+@pytest.mark.parametrize(("name", "share", "size"), [
+    ("current", 1.0, 0.02), ("current", 0.4, 0.02), ("speed", 1.0, 0.5), ("speed", 0.3, 0.5),
+    ("speed", 0.05, 0.5),
+])  # fmt: skip
+def test_a_drive_limited_to_less_than_the_design_says_so(name: str, share: float, size: float) -> None:
+    """Of the largest that steps of the command take; a slower drive's motion is not that of the command."""
+    angle = np.where(np.arange(3000) // 500 % 2, size, -size)
     command = commands.sampled(1e-3 * np.arange(3000.0), angle)
-    most = share * float(np.max(np.abs(simulate(DRIVE, command, 3.0).current_A)))
-    run = simulate(changed(DRIVE, limits={"peak_current_A": most}), command, 3.0)
-    seen = signals_of(run, 1)
-    _, wrong = _correlated(_record(seen, "reference", "angle", "current"))
-    assert ("limits.peak_current" in wrong) is (share < 1.0), wrong
-    assert f"the current stays below {np.max(np.abs(seen['current'])):.3g} A" in wrong or share == 1.0
+    most = share * float(np.max(np.abs(signals_of(simulate(DRIVE, command, 3.0), 1)[name])))
+    key, unit = LIMITED[name]
+    run = simulate(with_values(DRIVE, {"limits.continuous_current": 0.1, key: most}), command, 3.0)
+    record = _record(signals_of(run, 1), "reference", "angle", "speed", "current")
+    said = "; ".join(one.text for one in correlate_record(DRIVE, record).findings)
+    assert (f"or a lower limit of the {name} ({key})" in said) is (share < 1.0), said
+    assert f"the {name} stays below {np.max(np.abs(record[name])):.3g} {unit}" in said or share == 1.0
 
 
 def _lines(path: Path, columns: Columns, name: str, line: int, value: float) -> None:
