@@ -13,6 +13,10 @@ from sphinx.application import Sphinx
 
 HERE = Path(__file__).parent
 sys.path[:0] = [str(HERE.parent), str(HERE / "_ext")]
+
+from reports import arithmetic  # noqa: E402 - needs the path
+
+arithmetic.settle()  # commands run in this process, notebooks in those that it starts
 # The notebooks run in processes of their own, which must find the folder examples too.
 os.environ["PYTHONPATH"] = os.pathsep.join(filter(None, [str(HERE.parent), os.environ.get("PYTHONPATH")]))
 

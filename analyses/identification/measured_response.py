@@ -63,9 +63,9 @@ def identify_response(
     """Fit a design to a measured frequency response of one of its loops.
 
     The design's loops, sampled and exact, are the model; other values than those of `KEYS` are kept, and what
-    the response does not determine: a standard error above the design's value (of a delay a tick as well),
-    and above a quarter of what it is off; of a stiffness, or of one of several inertias, no end of its
-    interval within a factor of 30.
+    the response does not determine: a standard error above the design's value, and above a quarter of what
+    it is off (of a delay an interval beyond a tick as well); of a stiffness, or of one of several inertias,
+    no end of its interval within a factor of 30.
 
     ``source``: as `analyses.records.response.read_response` takes it. ``loop``: a stage (``"position"``) or
     a break point (``"w_ref"``); the outermost stage by default. ``of``: open loop, L/(1 + L), 1/(1 + L), or

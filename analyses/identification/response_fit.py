@@ -189,7 +189,7 @@ def _asked(start: Design, search: Search, joint: Point, level: float) -> tuple[F
 
     An inertia beside another that is looked for, and a stiffness, are told where their interval has two ends,
     another value where its standard error is below the design's value, or a quarter of what it is off; a
-    delay below a tick as well: by what it is off noise would decide which delays are told.
+    delay too whose interval is within a tick: by what it is off noise would decide which delays are told.
     """
     n, ends = search.count, np.zeros((search.count, 2))
     names, x = search.names[:n], joint.x[:n]
@@ -200,8 +200,8 @@ def _asked(start: Design, search: Search, joint: Point, level: float) -> tuple[F
     std = np.sqrt(np.diag(joint.covariance))[:n]
     own = np.array([parameter_value(start, name) for name in names])
     off = np.abs(search.values(joint.x)[:n] - own)
-    tick = [start.controller.period_s if name == "control.computing_delay" else 1e-300 for name in names]
-    share = std * search.sizes(joint.x) / np.max([np.abs(own), off / SURE, tick], axis=0)
+    tick = np.where(np.array(names) == "control.computing_delay", start.controller.period_s, 1e-300)
+    share = std * search.sizes(joint.x) / np.max([np.abs(own), off / SURE, tick / level], axis=0)
     inertia = np.char.endswith(names, "inertia")
     ranged = search.logs[:n] & ~(inertia & (inertia.sum() == 1))
     share[ranged] = level * std[ranged] / np.log(REACH)

@@ -16,12 +16,15 @@ import sys
 import tempfile
 from pathlib import Path
 from typing import Any, ClassVar
+from unittest import mock
 
 from docutils import nodes
 from docutils.parsers.rst import directives
 from sphinx.util.docutils import SphinxDirective
 
-ROOT = Path(__file__).parents[2]
+from reports.cli.main import main
+
+SURROUNDINGS = {"PYTHONPATH": str(Path(__file__).parents[2]), "COLUMNS": "80", "NO_COLOR": "1"}
 LONGEST_S = 600.0
 
 
@@ -111,19 +114,27 @@ class ShellRun(RunDirective):
 
     def result(self, text: str, room: Room) -> str:
         program, *arguments = shlex.split(text, comments=True)
-        if program == "actuator-lti":
-            arguments = ["-m", "reports.cli", *arguments]
-        elif program != "python" or arguments[:1] != ["-m"] or not arguments[1].startswith("examples."):
-            raise ValueError(f"{program}: only actuator-lti and python -m examples.NAME are run")
-        surroundings = {**os.environ, "PYTHONPATH": str(ROOT), "COLUMNS": "80", "NO_COLOR": "1"}
-        ended = subprocess.run(
-            [sys.executable, *arguments],
-            cwd=room.folder, env=surroundings, capture_output=True, text=True, timeout=LONGEST_S, check=False,
-        )  # fmt: skip
+        with contextlib.chdir(room.folder), mock.patch.dict(os.environ, SURROUNDINGS):
+            if program == "actuator-lti":
+                status, out, err = called(arguments)
+            elif program == "python" and arguments[0] == "-m" and arguments[1].startswith("examples."):
+                command, kept = [sys.executable, *arguments], {"capture_output": True, "text": True}
+                ended = subprocess.run(command, timeout=LONGEST_S, check=False, **kept)
+                status, out, err = ended.returncode, ended.stdout, ended.stderr
+            else:
+                raise ValueError(f"{program}: only actuator-lti and python -m examples.NAME are run")
         wanted = self.options.get("status", 0)
-        if ended.returncode != wanted:
-            raise ValueError(f"status {ended.returncode}, not {wanted}: {ended.stderr or ended.stdout}")
-        return ended.stdout + ended.stderr
+        if status != wanted:
+            raise ValueError(f"status {status}, not {wanted}: {err or out}")
+        return out + err
+
+
+def called(words: list[str]) -> tuple[int, str, str]:
+    """Status of a command and what it prints, here: a process of its own imports all libraries anew."""
+    out, err = io.StringIO(), io.StringIO()
+    with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
+        status = main(words)
+    return status, out.getvalue(), err.getvalue()
 
 
 def setup(app: Any) -> dict[str, Any]:

@@ -3,25 +3,20 @@
 import contextlib
 import io
 import json
-import multiprocessing
 import random
 import re
-import sys
 import tomllib
 import unicodedata
-import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
-from subprocess import CompletedProcess, TimeoutExpired
-from tempfile import TemporaryDirectory, TemporaryFile
+from tempfile import TemporaryDirectory
 from types import ModuleType
-from typing import IO, Any
+from typing import Any
 from unittest import mock
 
 import numpy as np
-import scipy.io  # noqa: F401 - here, not in every fork
 import tomli_w
 from command_lines import hostile, seeds
 from mutate import damaged, damaged_tree, extreme
@@ -52,6 +47,7 @@ from reports.nightly.cache import Cache, CorruptEntry, sealed
 from reports.nightly.history import open_history
 from reports.nightly.source import read_study
 from reports.nightly.state import INDEX, NIGHTS, remembered
+from tests.mat_reader import forked
 
 Fault = Callable[[bytes, random.Random], bytes]
 
@@ -144,35 +140,11 @@ def accounted(found: Record) -> None:
 
 
 def mat(read: Callable[[Path], object]) -> Callable[[Path], None]:
-    """The process of its own that reads is a fork of this one, which has scipy: 0.3 s less."""
-
     def attack(path: Path) -> None:
         with mock.patch.object(matlab, "run", forked):
             read(path)
 
     return attack
-
-
-def forked(*, input: bytes, timeout: float, args: Any, **_: object) -> CompletedProcess[bytes]:
-    with (
-        TemporaryFile() as out,
-        TemporaryFile() as err,
-        warnings.catch_warnings(action="ignore"),
-    ):  # of threads
-        process = multiprocessing.get_context("fork").Process(target=mat_reader, args=(input, out, err))
-        process.start()
-        process.join(timeout)
-        if process.is_alive():
-            process.kill()
-            raise TimeoutExpired(args, timeout)
-        for stream in (out, err):
-            stream.seek(0)
-        return CompletedProcess(args, process.exitcode or 0, out.read(), err.read())
-
-
-def mat_reader(data: bytes, out: IO[bytes], err: IO[bytes]) -> None:
-    sys.stdin, sys.stdout, sys.stderr = map(io.TextIOWrapper, (io.BytesIO(data), out, err))
-    matlab.main()
 
 
 def record(path: Path) -> None:

@@ -3,6 +3,7 @@
 import json
 from pathlib import Path
 from typing import Any
+from unittest import mock
 
 import control
 import numpy as np
@@ -15,7 +16,9 @@ from test_own_law import refused
 from actuator_lti import load_design
 from actuator_lti.design import Design, read_design_text, write_design
 from actuator_lti.design.law import Law
+from actuator_lti.files import matlab
 from actuator_lti.files.matlab import read_mat
+from tests.mat_reader import forked
 
 BASE = load_design("ilr33-amber-multirate")
 T = BASE.controller.period_of("velocity")
@@ -39,7 +42,8 @@ def read(folder: Path, held: Any, beside: str = "") -> Design:
     name = f'file = "k.{"json" if isinstance(held, str) else "mat"}"'
     made = [f"[control.velocity.law]\n{name}\n{beside}" if "velocity.law" in one else one for one in tables]
     (folder / "mine.toml").write_text("\n\n".join(made))
-    return load_design(folder / "mine.toml")
+    with mock.patch.object(matlab, "run", forked):
+        return load_design(folder / "mine.toml")
 
 
 NAMES = f"inputs = {INPUTS}"
