@@ -124,5 +124,7 @@ def _lag_rad(design: Design, load_Nm: float, static: StaticThreshold, way: float
         return lag - way * about.at_zero_rad - stays - twist
 
     standing = 0.5 * (sliding(0.0, way)[1] + sliding(0.0, -way)[1])
-    most = 4.0 * abs(missing(0.0))  # what the load makes of the lag is little of it
-    return root(missing, -most, most)
+    reach = -missing(0.0)  # what it is without the load's part, which bends that much further
+    while missing(reach) * reach < 0.0:
+        reach *= 2.0
+    return root(missing, 0.0, reach)

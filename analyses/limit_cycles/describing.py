@@ -15,10 +15,9 @@ from dataclasses import dataclass, replace
 from functools import partial, reduce
 from itertools import pairwise
 from math import exp, log, nan, pi
-from typing import Literal, TypeGuard
+from typing import Literal
 
 import numpy as np
-import numpy.typing as npt
 
 from actuator_lti.design.model import Coupling, Design, Filter, Friction, LoadFriction, Sensor
 from actuator_lti.drive.operating import Operating, dead_zone, described_dry, dry_torque, slope_at
@@ -27,7 +26,9 @@ from actuator_lti.loops import assemble_loops
 from actuator_lti.loops.periodic import exact_margins, point_blocks
 from actuator_lti.loops.tick import TickProgram
 from actuator_lti.systems.root import root
+from actuator_lti.types import Floats
 
+Follow = Callable[[float, "Mode | None"], "Mode | None"]  # the nearest, or the least damped
 Cause = Literal["play", "quantisation", "motor-quantisation", "friction"]
 # The sensor whose counts they are, and the other one
 SENSORS: dict[Cause, tuple[Sensor, Sensor]] = {
@@ -40,8 +41,8 @@ SPEEDS, DECADES = 36, 6.0  # of the motor, that friction is looked at with
 RESOLVED = 1e-9  # of the radius
 _TURNS = 1e-6  # least angle of an eigenvalue that oscillates
 _GONE = 0.01  # in one period: no oscillation; eigenvalues of what is late are zero, and rounding turns them
-_STEPS, _SETTLED = 60, 1e-7  # of the fixed point between the amplitudes of both speeds
-_JUMP = 10.0 * _SETTLED  # a radius comes as near to 1; it jumps past where another mode is the least damped
+_STEPS, _SETTLED = 60, 1e-9  # of the fixed point between both speeds and the eigenvalue
+_SAME = 1e-6  # so near are two eigenvalues of one oscillation
 
 
 @dataclass(frozen=True)
@@ -60,12 +61,16 @@ class Cycle:
 
 @dataclass(frozen=True)
 class Mode:
-    """The least damped oscillation of the loop over a position period, of any size."""
+    """An oscillation of the loop over a position period, of any size."""
 
-    radius: float
+    value: complex  # its eigenvalue
     frequency_hz: float
     shape: dict[str, complex]
-    settled: bool = True  # whether the speeds that it was asked with are its own
+
+    @property
+    def excess(self) -> float:
+        """By how much it grows over the period."""
+        return abs(self.value) - 1.0
 
 
 def cycles_of_play(design: Design, *, friction: bool) -> tuple[Cycle, ...]:
@@ -74,7 +79,7 @@ def cycles_of_play(design: Design, *, friction: bool) -> tuple[Cycle, ...]:
     if coupling is None or coupling.play_rad <= 0.0 or design.controller.position is None:
         return ()
     half = 0.5 * coupling.play_rad
-    grid = np.log(np.geomspace(LEAST * half, MOST * half, POINTS))
+    grid = log(half) + np.log1p(np.geomspace(LEAST - 1.0, MOST - 1.0, POINTS))
     own = partial(_cycle, "play", design, friction=friction)
     found = kept_up(lambda log_A, near: _at_twist(design, exp(log_A), friction, near), grid)
     return tuple(own(there, exp(log_A), there.shape["twist"], stable=s) for log_A, there, s in found)
@@ -83,9 +88,9 @@ def cycles_of_play(design: Design, *, friction: bool) -> tuple[Cycle, ...]:
 def cycles_of_friction(design: Design, load_Nm: float, top_speed_rad_s: float) -> tuple[Cycle, ...]:
     """Every cycle with a motor speed up to ``top_speed_rad_s``, over six decades."""
 
-    def mode(log_speed: float, _: Mode | None) -> Mode | None:
+    def mode(log_speed: float, near: Mode | None) -> Mode | None:
         at = Operating(point="describing-function", load_Nm=load_Nm, speed_amplitude_rad_s=exp(log_speed))
-        return mode_at(design, at)
+        return mode_at(design, at, near)
 
     grid = log(top_speed_rad_s) - np.linspace(DECADES, 0.0, SPEEDS) * log(10.0)
     own, found = partial(_cycle, "friction", design, friction=True), kept_up(mode, grid)
@@ -119,32 +124,34 @@ def dry_Nm(design: Design, load_Nm: float) -> float:
     return float(dry_torque(design, load_Nm, 1) + dry_torque(design, load_Nm, -1))
 
 
-def kept_up(
-    mode: Callable[[float, Mode | None], Mode | None], grid: npt.NDArray[np.float64]
-) -> Iterator[tuple[float, Mode, bool]]:
-    """Where along a grid the least damped oscillation, that of a value from one near it, keeps its size.
+def kept_up(mode: Follow, grid: Floats) -> Iterator[tuple[float, Mode, bool]]:
+    """Where along a grid an oscillation keeps its size, of those that are the least damped somewhere.
 
     Gives value, oscillation, and whether it dies out beyond: an amplitude at which it attracts.
     """
     last: Mode | None = None
     for low, value in pairwise([nan, *map(float, grid)]):
-        now = mode(value, last)
-        if _settled(last) and _settled(now) and _changes(last.radius - 1.0, now.radius - 1.0):
-
-            def excess(x: float, near: Mode = last) -> float:
-                found = mode(x, near)
-                return found.radius - 1.0 if _settled(found) else -1.0
-
-            if _changes(excess(low), excess(value)):
-                at = root(excess, low, value, 1e-12)
-                there = mode(at, last)
-                if _settled(there) and abs(there.radius - 1.0) < _JUMP:
-                    yield at, there, last.radius > 1.0
-        last = now
+        now, least = last and mode(value, last), mode(value, None)
+        followed = [(last, now)]
+        if last and least and not (now and abs(least.value - now.value) < _SAME):
+            followed.append((mode(low, least), least))
+        for before, after in followed:
+            if before and after and _changes(before.excess, after.excess):
+                yield from _limit(mode, low, value, before)
+        last = max((one for one in (now, least) if one), key=lambda one: one.excess, default=None)
 
 
-def _settled(mode: Mode | None) -> TypeGuard[Mode]:
-    return mode is not None and mode.settled
+def _limit(mode: Follow, low: float, value: float, near: Mode) -> Iterator[tuple[float, Mode, bool]]:
+    """Where between two values the oscillation near one at the first keeps its size."""
+
+    def excess(x: float) -> float:
+        found = mode(x, near)
+        return -1.0 if found is None else found.excess
+
+    if _changes(excess(low), excess(value)):
+        there = mode(at := root(excess, low, value, 1e-12), near)
+        if there and abs(there.excess) < _SAME:
+            yield at, there, near.excess > 0.0
 
 
 def _changes(a: float, b: float) -> bool:
@@ -153,34 +160,31 @@ def _changes(a: float, b: float) -> bool:
 
 
 def _at_twist(design: Design, A: float, friction: bool, near: Mode | None) -> Mode | None:
-    """The least damped oscillation at a twist of amplitude A, the speeds in it being its own.
+    """The oscillation near one, or the least damped, at a twist of amplitude A, the speeds in it its own.
 
-    With friction a fixed point, begun with the shape of an oscillation ``near``, or where that leads to none
-    with speeds at which friction is small. Where it does not settle, friction stops what it began with.
+    With friction a fixed point, begun with the shape of the one ``near``, or without friction. None: it does
+    not settle, or friction stops it.
     """
-    speeds = _speeds(near, A)
+    mode = near if near and friction else mode_at(_equivalent(design, A, None), Operating(), near)
+    if mode is None or not friction:
+        return mode
+    speeds = _speeds(design, mode, A)
     for _ in range(_STEPS):
-        mode = mode_at(_equivalent(design, A, *speeds, friction), Operating())
-        if mode is None and near is not None:
-            return _at_twist(design, A, friction, None)
-        if mode is None or not friction:
+        last, mode = mode, mode_at(_equivalent(design, A, speeds), Operating(), mode)
+        if mode is None or abs(mode.value - last.value) < _SETTLED:
             return mode
-        now = _speeds(mode, A)
-        if max(abs(log(new / old)) for new, old in zip(now, speeds, strict=True)) < _SETTLED:
-            return mode
-        speeds = now[0] ** 0.6 * speeds[0] ** 0.4, now[1] ** 0.6 * speeds[1] ** 0.4
-    return mode and replace(mode, settled=False)
+        speeds = _speeds(design, mode, A) ** 0.6 * speeds**0.4
+    return None
 
 
-def _speeds(mode: Mode | None, A: float) -> tuple[float, float]:
-    """Amplitudes of the motor's and the load's speed at a twist of amplitude A."""
-    if mode is None:
-        return 1.0, 1.0
-    size = A / abs(mode.shape["twist"])
-    return max(size * abs(mode.shape["w"]), 1e-12), max(size * abs(mode.shape["W"]), 1e-12)
+def _speeds(design: Design, mode: Mode, A: float) -> Floats:
+    """Amplitudes of the motor's and the load's speed at a twist of amplitude A; one that rests has few."""
+    ratios, shape = np.array([design.ratio_to_coupling, 1.0]), mode.shape
+    ends = A / abs(shape["twist"]) * np.abs([shape["w"], shape["W"]]) / ratios
+    return ratios * np.maximum(ends, RESOLVED * ends.max())
 
 
-def _equivalent(design: Design, A: float, W: float, W_l: float, friction: bool) -> Design:
+def _equivalent(design: Design, A: float, speeds: Floats | None) -> Design:
     """The linear drive of the same fundamentals."""
     coupling, behind = design.coupling, design.load.friction or LoadFriction()
     assert coupling is not None
@@ -190,19 +194,19 @@ def _equivalent(design: Design, A: float, W: float, W_l: float, friction: bool) 
         stiffness, k = stiffness + (beyond - k) * dead_zone((half + twist) / A), beyond
     own = replace(design.friction, load_coefficient=0.0)
     slope, load_slope = own.viscous_Nms_rad, behind.viscous_Nms_rad
-    if friction:
-        at = Operating(point="describing-function", speed_amplitude_rad_s=W)
+    if speeds is not None:
+        at = Operating(point="describing-function", speed_amplitude_rad_s=float(speeds[0]))
         slope = slope_at(replace(design, friction=own), at)
-        load_slope += described_dry(behind.dry_torque_Nm, W_l)
+        load_slope += described_dry(behind.dry_torque_Nm, float(speeds[1]))
     spring = Coupling(stiffness_Nm_rad=stiffness, damping_Nms_rad=damping, after=coupling.after)
     load = replace(design.load, friction=LoadFriction(viscous_Nms_rad=load_slope))
     return replace(design, coupling=spring, friction=Friction(viscous_Nms_rad=slope), load=load)
 
 
-def mode_at(design: Design, at: Operating) -> Mode | None:
-    """The least damped oscillation of the linear loop at an operating point; None without any."""
+def mode_at(design: Design, at: Operating, near: Mode | None) -> Mode | None:
+    """The oscillation near one, or the least damped, of the linear loop at a point; None without any."""
     program = TickProgram(wire(design, at), "position")
-    return _oscillation([program.tick(k).A for k in range(program.ticks)], program.states, design)
+    return _oscillation([program.tick(k).A for k in range(program.ticks)], program.states, design, near)
 
 
 def output_of(design: Design, state: dict[str, complex]) -> complex:
@@ -273,9 +277,9 @@ def _limit_of_speed(free: Design) -> tuple[float, Mode] | None:
     plain, double = programs
     both = [(plain.tick(k).A, double.tick(k).A) for k in range(plain.ticks)]
 
-    def mode(log_gain: float, _: Mode | None) -> Mode | None:
+    def mode(log_gain: float, near: Mode | None) -> Mode | None:
         ticks = [one + (exp(log_gain) - 1.0) * (two - one) for one, two in both]
-        return _oscillation(ticks, plain.states, free)
+        return _oscillation(ticks, plain.states, free, near)
 
     found = next(kept_up(mode, np.log(np.geomspace(1.0, MOST_GAIN, GAINS))), None)
     if found is None or found[2]:  # unstable from the first
@@ -284,19 +288,21 @@ def _limit_of_speed(free: Design) -> tuple[float, Mode] | None:
 
 
 def _oscillation(
-    ticks: Sequence[np.ndarray], states: Sequence[str], design: Design, *, at_limit: bool = False
-) -> Mode | None:
-    """The largest eigenvalue of ticks that turns, or that nearest to the unit circle; None without any."""
+    ticks: Sequence[np.ndarray], states: Sequence[str], design: Design, near: Mode | None = None,
+    *, at_limit: bool = False,
+) -> Mode | None:  # fmt: skip
+    """The eigenvalue that turns nearest to one or to the unit circle, or the largest; None without any."""
     values, vectors = np.linalg.eig(reduce(lambda A, tick: tick @ A, ticks))
     turning = np.flatnonzero((np.angle(values) > _TURNS) & (np.abs(values) > _GONE))
     if not turning.size:
         return None
     size = np.abs(values[turning])
-    k = int(turning[np.argmin(np.abs(size - 1.0)) if at_limit else np.argmax(size)])
+    far = np.abs(values[turning] - near.value) if near else np.abs(size - 1.0) if at_limit else -size
+    k = int(turning[np.argmin(far)])
     period = wire(design, Operating()).period_s("position")
     frequency = float(np.angle(values[k])) / (2.0 * pi * period)
     shape = dict(zip(states, map(complex, vectors[:, k]), strict=True))
-    return Mode(float(abs(values[k])), frequency, shape)
+    return Mode(complex(values[k]), frequency, shape)
 
 
 def without_nonlinearities(design: Design) -> Design:

@@ -32,8 +32,8 @@ class CycleResult:
     """A predicted cycle against the simulator, started in its shape at several sizes."""
 
     cycle: describing.Cycle
-    # Amplitude of the output over the predicted one: of a stable cycle where the motion ends, of an unstable
-    # one the size from which it grows; ``None``: it does so nowhere
+    # Amplitude of the output, or where it stands of the motor, over the predicted one: of a stable cycle
+    # where the motion ends, of an unstable one the size from which it grows; ``None``: it does so nowhere
     ratio: float | None
     frequency_hz: float | None  # there; of a stable cycle in the second half of what is watched
     tried: bool = True  # whether the simulator could watch it: so many periods may take too many ticks
@@ -104,6 +104,10 @@ def confirm(design: Design, cycle: describing.Cycle) -> CycleResult:
     # Half a count below the edge, as the mean of the sensor is; a speed made of counts has no mean: the motor
     # swings about the edge itself
     rows.step("command", -0.5 * (design.output_quantum_rad or 0.0) if cycle.cause == "quantisation" else 0.0)
+    # At the moment at which the states that begin at zero all the same have least
+    left = np.array([value for name, value in cycle.state.items() if name not in _STARTS and value])
+    turned = np.exp(0.5j * (np.pi - np.angle(((left / np.abs(left)) ** 2).sum() or -1.0)))
+    cycle = replace(cycle, state={name: turned * value for name, value in cycle.state.items()})
     for name, value in cycle.state.items():
         if name in _STARTS and (tried.coupling is not None or name not in ELASTIC):
             rows[_STARTS[name]] = SCALES * value.real
@@ -116,7 +120,8 @@ def confirm(design: Design, cycle: describing.Cycle) -> CycleResult:
     row["record_every"] = max(int(period) // MOMENTS, 1)
     run = row.trajectory()
     begin = run.time_s.size // 2 if cycle.stable else 0  # what other motion the start brings is gone by then
-    t, w = run.time_s[begin:-1], np.diff(run.output_angle_rad[begin:])
+    output = run.output_angle_rad[begin:]
+    t, w = run.time_s[begin:-1], np.diff(output if np.ptp(output) else run.motor_angle_rad[begin:])
     up = np.flatnonzero((w[:-1] < 0.0) & (w[1:] >= 0.0))
     rising = t[up] - w[up] * (t[up + 1] - t[up]) / (w[up + 1] - w[up])
     hertz = float((len(up) - 1) / (rising[-1] - rising[0])) if len(up) > 1 else None
@@ -133,7 +138,7 @@ def _turn(rows: Rows, cycle: describing.Cycle, period: float) -> int | None:
     drives = [rows.running(k) for k in range(len(rows))]
     slow = cycle.with_friction and CYCLES_WATCHED * period > MOST_WORK
     if not slow:
-        size = _sizes(rows, drives, round(period), 2) / cycle.output_rad
+        size = _sizes(cycle, rows, drives, round(period), 2)
         if size.max() < SCALES[0] or size.min() == np.inf:  # all died out, or failed; the large may yet fall
             return None
     watch, window = _ends if slow else _sizes, round(3.0 * period)
@@ -141,8 +146,8 @@ def _turn(rows: Rows, cycle: describing.Cycle, period: float) -> int | None:
     for reach in range(2, middle + 1, 2):
         near = range(middle - reach, middle + reach + 1)
         new = [k for k in near if k not in known]
-        size = watch(rows.take(new), [drives[k] for k in new], window, CYCLES_WATCHED // 3)
-        grows[new], known = size > SCALES[new] * cycle.output_rad, near
+        size = watch(cycle, rows.take(new), [drives[k] for k in new], window, CYCLES_WATCHED // 3)
+        grows[new], known = size > SCALES[new], near
         here = grows[near]
         turns = near.start + np.flatnonzero((here[1:] != here[:-1]) & (here[:-1] == cycle.stable))
         if turns.size:
@@ -150,20 +155,30 @@ def _turn(rows: Rows, cycle: describing.Cycle, period: float) -> int | None:
     return None
 
 
-def _ends(_: Rows, drives: Sequence[Running], window: int, count: int) -> Floats:
-    """Half the span of the output in what motions end in, followed for no more than so many ticks of work."""
+def _ends(cycle: describing.Cycle, rows: Rows, drives: Sequence[Running], window: int, count: int) -> Floats:
+    """Sizes of what motions end in, followed for no more than so many ticks of work."""
     ended = [judge(drive, count * window) for drive in drives]
-    return np.array([np.inf if one is None or one.verdict == "diverging" else one.amplitude for one in ended])
+    motor = np.array([0.0 if one is None else one.motor_amplitude * rows.value("ratio") for one in ended])
+    output = [np.inf if one is None or one.verdict == "diverging" else one.amplitude for one in ended]
+    return _over_predicted(cycle, np.array(output), motor, "th")
 
 
-def _sizes(rows: Rows, drives: Sequence[Running], window: int, count: int) -> Floats:
-    """Half the span of the output in the last of so many windows, so many ticks each; inf: it failed."""
+def _sizes(cycle: describing.Cycle, rows: Rows, drives: Sequence[Running], window: int, count: int) -> Floats:
+    """Sizes in the last of so many windows, so many ticks each; inf: it failed."""
     rows["ticks"] = count * window
     for drive in drives:
         drive.change("window", window)
     result = rows.run(drives=drives)
-    low, high = result.span("output_angle_rad")
-    return np.where(result.ok, 0.5 * (high - low), np.inf)
+    signals = ("output_angle_rad", "motor_speed_rad_s")
+    output, motor = (0.5 * np.ptp(result.span(one), axis=0) for one in signals)
+    return np.where(result.ok, _over_predicted(cycle, output, motor, "w"), np.inf)
+
+
+def _over_predicted(cycle: describing.Cycle, output_rad: Floats, motor: Floats, state: str) -> Floats:
+    """Half the span of the output over the predicted one; where it stands in every motion the motor's."""
+    if motor.any() and not output_rad.any():
+        return motor / abs(cycle.state[state])
+    return output_rad / cycle.output_rad
 
 
 def _tried(design: Design, cycle: describing.Cycle) -> Design:

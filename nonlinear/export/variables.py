@@ -9,6 +9,7 @@ from actuator_lti.design.field import BIG, unit_on
 from actuator_lti.design.fields import fields_in, parts_of
 from actuator_lti.design.model import Design
 from actuator_lti.design.plant import reachable_speed
+from actuator_lti.design.units import ampere_unit
 from nonlinear._kernels import layout as at
 from nonlinear.export.c_files import stage_words
 from nonlinear.export.trace import Key, KeyTrace
@@ -18,6 +19,7 @@ FIRST_OUTPUT, FIRST_FLAG, INITIAL_ANGLE = 10, 30, 90
 FIRST_KEY, FIRST_CONSTANT, FIRST_TEXT = 100, 1000, 2000
 
 FLAG_BITS = (*at.LIMITER_BITS, at.FLAG_STICK)  # of each Boolean output, in order
+OF_DC = ", of the equivalent DC motor"  # amperes and volts of an AC motor
 SHOWN = {"rad": "deg", "rad/s": "deg/s", "m": "mm"}  # unit that a host shows a value in
 
 Causality = Literal["input", "output", "parameter", "local", "independent"]
@@ -83,7 +85,7 @@ def _signal(design: Design, number: int, text: tuple[str, str, str], **more: Any
     """An input or output: name, words and unit, with its size where that is known."""
     name, words, unit = text
     size = sizes(design)[name]
-    words += ", of the equivalent DC motor" * (unit in ("A", "V") and design.motor.constants != "dc")
+    words += OF_DC * (unit in ("A", "V") and design.motor.constants != "dc")
     turns = unit == "rad/s" and name in ("motor.speed", "control.speed_command")
     return Variable(
         name=name, reference=number, variability="continuous", description=words, unit=unit,
@@ -140,16 +142,17 @@ def _parameters(design: Design, trace: KeyTrace) -> tuple[Variable, ...]:
         description="output angle at the start, everything at rest", unit=angle, start=0.0,
         shown=SHOWN[angle],
     )  # fmt: skip
-    rest = [_of_key(key, n, "local", "constant") for n, key in enumerate(trace.constants, FIRST_CONSTANT)]
-    keys = enumerate(trace.keys, FIRST_KEY)
-    ours = [_of_key(key, n, "parameter", "fixed" if key.fixed else "tunable") for n, key in keys]
-    return (start, *ours, *rest)
+    of, rest, keys = design.motor.constants, enumerate(trace.constants, FIRST_CONSTANT), trace.keys
+    ours = [_of_key(key, n, of, "fixed" if key.fixed else "tunable") for n, key in enumerate(keys, FIRST_KEY)]
+    return (start, *ours, *(_of_key(key, n, of, "constant") for n, key in rest))
 
 
-def _of_key(key: Key, reference: int, causality: Causality, variability: str) -> Variable:
+def _of_key(key: Key, reference: int, constants: str, variability: str) -> Variable:
+    causality: Causality = "local" if variability == "constant" else "parameter"
+    words = key.description + OF_DC * (ampere_unit(key.path, key.unit, constants) != key.unit)
     return Variable(
         name=structured(key.path), reference=reference, causality=causality, variability=variability,
-        description=key.description, unit=key.unit, start=key.value, low=key.low, high=key.high,
+        description=words, unit=key.unit, start=key.value, low=key.low, high=key.high,
         kind="integer" if key.whole else "real", shown=SHOWN.get(key.unit, ""),
     )  # fmt: skip
 

@@ -1,6 +1,7 @@
 """Figures for a specification sheet: rates, acceleration, current, duty, step times, torque and speed."""
 
 import math
+from itertools import cycle
 
 import numpy as np
 
@@ -116,16 +117,10 @@ def _planes(result: Specification) -> list[doc.Block]:
             inside = (0.97 * widest, 1.2 * top)
             _bound(panel, bound.name, fast * bound.speed_rad_s, strong * bound.torque_Nm, inside)
         steady = [d for d in result.plane.demands if d.name.startswith(f"steady motion at {load:g} ")]
-        for k, each in enumerate(steady):
-            look = {
-                "colour": style.INK,
-                "width": 1.5,
-                "dash": 2,
-                "marker": "os^D"[k % 4],
-                "size": 5.0,
-                "every": 8,
-            }
-            panel.curve(fast * each.speed_rad_s, strong * each.torque_Nm, each.name, **look)
+        look = {"colour": style.INK, "width": 1.5, "dash": 2, "size": 5.0, "every": 8}
+        for each, marker in zip(steady, cycle("os^D"), strict=False):
+            speed, torque = fast * each.speed_rad_s, strong * each.torque_Nm
+            panel.curve(speed, torque, each.name, marker=marker, **look)
         caption = (
             f"{'Force' if linear else 'Motor torque'} over speed at {load:g} {unit}: bounds, what steady "
             "motion needs, and the paths of standard manoeuvres at full deflection. Below zero it brakes; "

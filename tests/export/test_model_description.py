@@ -76,6 +76,8 @@ def test_sizes_and_units_are_those_of_the_data_sheet(name: str, version: int) ->
         "control.speed_command": (speed, spin, of_motor),
         "initial.angle": (None, turn, shown),
     }
+    limit = known.get("limits.peak_current", {"description": ""})["description"]
+    assert ("equivalent DC motor" in limit) == (name == "ballscrew")
     for each, (size, *units) in wanted.items():
         about = known[each]
         assert [about["unit"], about.get("displayUnit")] == units, each

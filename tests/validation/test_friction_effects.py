@@ -9,6 +9,7 @@ import pytest
 
 from actuator_lti import assemble_loops, load_design
 from actuator_lti.design import model, with_values
+from actuator_lti.design.loader import as_design
 from analyses.friction_effects import friction_effects
 from analyses.friction_effects.breakaway import static_threshold, threshold
 from analyses.friction_effects.orbit import Orbit
@@ -55,6 +56,8 @@ def extruder(position_s: float | None = None, velocity_s: float | None = None) -
 
 COGGING = {"motor.cogging": 1e-3, "motor.cogging_periods": 4.0, "motor.cogging_phase": math.pi / 6.0}
 FORCE, SLOPE = 35.15065 * 243.45 * 160.18, 0.05 / 2.0 * 0.25 * 25.0 * 20.0  # of the force source and the map
+PUSHING = {"path": "back-drivable", "moment_slope_Nm_rad": 0.9 * FORCE}  # nine tenths of the stiffness
+PUSHED = changed(EMPS, load=PUSHING, limits=model.Limits(voltage_V=1e9))
 THRESHOLDS: dict[str, tuple[model.Design, float, float, float, str]] = {
     # torque to overcome over stiffness, and the integral times of speed and position
     "a force source": (EMPS, (20.3935 - 3.1648) / FORCE, math.inf, math.inf, ""),
@@ -96,7 +99,8 @@ def _joint_rate(loop: Hysteresis) -> float:
 
 @pytest.mark.parametrize(("name", "load_Nm", "expected", "within"), [
     ("ilr33-amber", 0.0, lambda loop: 0.0, 0.0),
-    ("emps", 0.0, lambda loop: 2.0 * 20.3935 / (35.15065 * 243.45 * 160.18), 1e-9),
+    ("emps", 0.0, lambda loop: 2.0 * 20.3935 / FORCE, 1e-9),
+    (PUSHED, 0.0, lambda loop: 20.0 * 20.3935 / FORCE, 1e-6),
     ("ilr33-amber-compliant", 0.0, lambda loop: 2.0 * 0.05 / 1500.0 + 1e-3, 1e-9),  # at rest in the play
     ("ilr33-amber-compliant", 8.0, lambda loop: 2.0 * 0.05 / 1500.0, 1e-9),  # which the load takes out
     ("ballscrew", 0.0, lambda loop: 2.0 * 30.0 / 1e8, 1e-9),
@@ -106,7 +110,7 @@ def _joint_rate(loop: Hysteresis) -> float:
 ])  # fmt: skip
 def test_what_a_reversal_loses_is_predicted(name, load_Nm, expected, within):
     """Behind a motor's sensor 2 C0_l/k and the play; in front of it the error that friction asks for."""
-    design = quiet(load_design(name))
+    design = quiet(as_design(name))
     static = threshold(design, load_Nm).static
     loop = hysteresis(design, load_Nm, static, 150_000 if name == "joint" else 3000)
     rounding = 1e-12 * loop.amplitude_rad

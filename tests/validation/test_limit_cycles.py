@@ -3,6 +3,7 @@
 from functools import cache
 from itertools import pairwise
 from math import asin, degrees, pi
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -136,6 +137,17 @@ def test_cycles_of_the_fin_s_play_are_found_by_the_simulator() -> None:
         seen = confirm(FIN, cycle)
         assert seen.ratio == pytest.approx(1.0, abs=0.1)
     assert seen.frequency_hz == pytest.approx(attracting.frequency_hz, rel=0.1)
+
+
+@pytest.mark.parametrize(("name", "twist_rad", "hertz"), [
+    ("rotor_hunts", 2.4725e-3, 17.70), ("load_swings", 3.346e-3, 1.365),
+])  # fmt: skip
+def test_a_cycle_in_which_friction_holds_one_end(name: str, twist_rad: float, hertz: float) -> None:
+    """Twist and frequency as another simulator, written from the model in small steps, ends in them."""
+    design = load_design(Path(__file__).parent / f"{name}.toml")
+    (cycle,) = cycles_of_play(design, friction=True)
+    assert (cycle.inner_rad, cycle.frequency_hz) == pytest.approx((twist_rad, hertz), rel=0.03)
+    assert confirm(design, cycle).verdict == "confirmed"
 
 
 @pytest.mark.parametrize("slope", ["40 N*m/rad", "150 N*m/rad"])
