@@ -277,29 +277,29 @@ def _with_steps(
     """
     tick, early = driven.design.controller.period_s, driven.likely_s
     ticks = None if driven.hold is None else 0.0
-    made = run(early)
+    made, hold = run(early), driven.hold
+    more_s = hold.more_s if hold is not None and not hold.is_whole else None
+    if more_s is not None and driven.early_s is not None:
+        # what was found may be a little beyond the ends, but no row sees another voltage
+        inside = float(np.clip(0.0, *more_s(early)))
+        return replace(driven, early_s=early), made, signals_at(driven.design, made, time + inside, -inside)
     series = signals_at(driven.design, made, time, ticks)
     name = next((name for name in ANSWERS if name in measured), "")
     for _ in range(STEP_ROUNDS if driven.early_s is None and len(early) and name else 0):
         more = driving.earlier_s(driven, time, measured[name], series[name])
-        if driven.hold is None:
+        if hold is None:
             moved = tick * np.clip(np.round((early + more) / tick), *ticks_early(driven.design, time))
         else:
-            moved = early + tick * np.clip(np.round(more / tick), *driven.hold.more_ticks(early))
+            moved = early + tick * np.clip(np.round(more / tick), *hold.more_ticks(early))
         if np.array_equal(moved, early):
             break
         other = run(moved)
         if _off(measured, nearer := signals_at(driven.design, other, time, ticks)) >= _off(measured, series):
             break
         early, made, series = moved, other, nearer
-    if driven.hold is not None and not driven.hold.is_whole:
-        ends = driven.hold.more_s(early)
-        if driven.early_s is None:
-            later = likeliest_s(driven.design, made, time, measured, ends)
-            early, series = early + later, signals_at(driven.design, made, time + later, ticks)
-        else:  # what was found may be a little beyond the ends, but no row sees another voltage
-            inside = float(np.clip(0.0, *ends))
-            series = signals_at(driven.design, made, time + inside, -inside)
+    if more_s is not None:
+        later = likeliest_s(driven.design, made, time, measured, more_s(early))
+        early, series = early + later, signals_at(driven.design, made, time + later, ticks)
     return replace(driven, early_s=early), made, series
 
 

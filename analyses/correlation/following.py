@@ -13,14 +13,11 @@ from analyses.correlation.driving import Driven, command_of
 from analyses.estimation.least_squares import identifiable, solve
 from analyses.records.consistency import COSINE, OVER, RATE_TOLERANCE, SURE, Finding
 from analyses.records.driven_motion import ratio_of
+from analyses.records.naming import KNOWN_UNITS
 from analyses.records.record import Record
 
 PLACES = ("angle", "output_angle", "position")
-LIMITED = {
-    "current": ("limits.peak_current", "A"), "speed": ("limits.speed", "rad/s"),
-    "velocity": ("limits.speed", "m/s"),
-}  # fmt: skip
-"""What a limit of a drive shows in, its key and unit."""
+LIMITED = {"current": "limits.peak_current", "speed": "limits.speed", "velocity": "limits.speed"}
 
 
 @dataclass(frozen=True)
@@ -110,8 +107,8 @@ def followed(
 def _limit(recorded: Mapping[str, Floats], simulated: Mapping[str, Floats]) -> str:
     """A limit of the drive that the design does not have: of what is longest near its largest value."""
     reasons = dict[float, str]()
-    for name, (key, unit) in LIMITED.items():
-        sizes = [np.abs(one[name]) for one in (recorded, simulated) if name in one]
+    for name, key in LIMITED.items():
+        sizes, unit = [np.abs(one[name]) for one in (recorded, simulated) if name in one], KNOWN_UNITS[name]
         if len(sizes) == 2 and (most := sizes[0].max()) < (would := sizes[1].max()) / OVER:
             why = (
                 f"the {name} stays below {most:.3g} {unit}, the design's loops take up to {would:.3g} {unit}"

@@ -141,15 +141,15 @@ def creeping(design: Design, *, driven: bool = False) -> OperatingMotion:
 def on_its_stand(design: Design, like: Design | None = None) -> Design:
     """A drive without friction that would give it two slopes where it is tested; others as they are.
 
-    One in motion feels no cogging. One that has to stand knows no friction by direction; a rigid one whose
-    load is damped none by load, which grows with the speed and is no part of its loops.  ``like`` is the
-    drive that is tested, if another.
+    One in motion feels no cogging. One that has to stand knows no friction by direction; a rigid one none by
+    load, which has two slopes at no load and is no part of its loops.  ``like`` is the drive that is tested,
+    if another.
     """
     design, tested = operating.averaged(design), operating.averaged(like or design)
     friction = design.friction
     if follows_angle(tested):
         friction = replace(friction, load_coefficient=0.0, points=(), viscous_reverse_Nms_rad=None)
-    elif tested.coupling is None and tested.load.moment_damping_Nms_rad:
+    elif tested.coupling is None:
         friction = replace(friction, load_coefficient=0.0)
     return design if friction == design.friction else replace(design, friction=friction)
 

@@ -36,6 +36,7 @@ from actuator_lti.types import Floats
 from nonlinear._kernels import layout as at
 from nonlinear.runs.running import Piece, Running, limiters_of
 from nonlinear.settling import drift
+from nonlinear.settling.grown import Grown
 
 Verdict = Literal["at rest", "limit cycle", "still moving", "diverging"]
 
@@ -111,10 +112,11 @@ class _Watch:
     periods: int = 0  # gone by, leaps included
     times: list[Floats] = field(default_factory=list)
     seen: list[Floats] = field(default_factory=list)  # per piece: reference, followed, motor
-    extents: list[list[list[float]]] = field(default_factory=list)  # per piece, of followed and motor
+    entries: int = 0
+    extents: Grown = field(default_factory=lambda: Grown(5))  # per piece: entries, of followed and motor
     ranges: list[tuple[Floats, Floats]] = field(default_factory=list)  # per piece, of _RANGED
     acted: list[tuple[int, int, int]] = field(default_factory=list)  # entries, flags, events
-    left: list[Floats] = field(default_factory=list)  # of each breakaway: `_breakaways`
+    left: Grown = field(default_factory=lambda: Grown(5))  # of each breakaway: `_breakaways`
     looked: int = 0  # pieces in which breakaways were looked for
     leaps: int = 0  # over waits
     scales: drift.Scales = field(init=False)
@@ -161,7 +163,8 @@ class _Watch:
         self.periods += periods
         self.seen.append(self._signals(piece.columns))
         moved = self.seen[-1][1:]
-        self.extents.append([moved.min(axis=1).tolist(), moved.max(axis=1).tolist()])
+        self.entries += periods
+        self.extents.add([[self.entries, *moved.min(axis=1), *moved.max(axis=1)]])
         flags = int(np.bitwise_or.reduce(piece.flags))
         self.acted.append((periods, flags, piece.events))
         ranged = piece.columns[_RANGED]
@@ -175,15 +178,15 @@ class _Watch:
         known = max(self.looked - 1, 0)
         times, seen = np.concatenate(self.times[known:]), np.concatenate(self.seen[known:], axis=1)
         new = max(self.times[known].size - 2, 0) if self.looked else 0  # the last entry is judged now
-        first, times, places = sum(map(len, self.times[:known])) + new, times[new:], seen[1:, new:]
+        first = new + (int(self.extents.rows[known - 1, 0]) if known else 0)
+        times, places = times[new:], seen[1:, new:]
         steps = np.diff(places, axis=1)
         moves = np.abs(steps).max(axis=0) > self._least / drift.DRIFT
         last = np.flatnonzero(moves[1:] & ~moves[:-1]) + 1
-        self.left.append(
-            np.stack([times[last], first + last, *places[:, last], np.sign(steps[:, last].sum(axis=0))])
-        )
+        ways = np.sign(steps[:, last].sum(axis=0))
+        self.left.add(np.column_stack([times[last], first + last, *places[:, last], ways]))
         self.looked = len(self.times)
-        return np.concatenate(self.left, axis=1)
+        return self.left.rows.T
 
     @property
     def spent(self) -> bool:
@@ -279,9 +282,9 @@ class _Watch:
 
     def _spans_from(self, entries: Floats) -> Floats:
         """Spans of all that moved from the pieces of entries to the end."""
-        low, high = np.moveaxis(np.array(self.extents)[::-1], 1, 0)
+        ends, low, high = np.split(self.extents.rows[::-1], [1, 3], axis=1)
         spans = (np.maximum.accumulate(high) - np.minimum.accumulate(low)).max(axis=1)[::-1]
-        return spans[np.searchsorted(np.cumsum([one[0] for one in self.acted]), entries, side="right")]
+        return spans[np.searchsorted(ends[::-1, 0], entries, side="right")]
 
     def _still(self, piece: Piece) -> bool:
         """Whether all signals keep their values; of a speed drive, all but the angles."""

@@ -81,7 +81,7 @@ def _plan(plan: Plan) -> doc.Section:
         blocks.append(doc.figure("plan", chart, "Command of all motions, one after the other"))
     intro = (
         f"Motions from rest to rest, as large as the limits of {plan.design.name} allow in simulation, "
-        f"chosen one by one (A-optimal); recorded at 1 kHz with white noise {plan.noise:g} {drive} rms. "
+        f"chosen one by one (A-optimal); recorded at 1 kHz with white noise of {plan.noise:g} {drive} (rms). "
         f"The covariance is that of the fit itself. {NEXT if plan.measured else ''}"
     )
     status: doc.Status = "pass" if plan.passed else "fail"

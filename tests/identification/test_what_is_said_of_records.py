@@ -22,6 +22,7 @@ from analyses.identification.bench import Settings, identify_bench
 from analyses.identification.to_design import inertia_share
 from analyses.identification.verdict import sampling_items
 from analyses.records.consistency import check_record
+from analyses.records.naming import KNOWN_UNITS
 from analyses.records.open_record import open_record
 from analyses.records.record import Record, prepared
 from nonlinear import commands, simulate
@@ -79,7 +80,7 @@ def test_a_drive_limited_to_less_than_the_design_says_so(name: str, share: float
     angle = np.where(np.arange(3000) // 500 % 2, size, -size)
     command = commands.sampled(1e-3 * np.arange(3000.0), angle)
     most = share * float(np.max(np.abs(signals_of(simulate(DRIVE, command, 3.0), 1)[name])))
-    key, unit = LIMITED[name]
+    key, unit = LIMITED[name], KNOWN_UNITS[name]
     run = simulate(with_values(DRIVE, {"limits.continuous_current": 0.1, key: most}), command, 3.0)
     record = _record(signals_of(run, 1), "reference", "angle", "speed", "current")
     said = "; ".join(one.text for one in correlate_record(DRIVE, record).findings)

@@ -134,6 +134,13 @@ def test_the_outermost_loop_is_listed_once(monkeypatch) -> None:
     assert contradicted == {"u", "i_ref", "w_ref", "output"}
 
 
+@pytest.mark.parametrize("name", ["ilr33-amber", "ilr33-amber-tanh"])
+def test_friction_by_load_has_two_slopes_at_no_load_and_the_response_to_one_none_of_them(name: str) -> None:
+    drive = changed(load_design(name), load={"path": "back-drivable"})
+    assert drive.friction.load_coefficient > 0.0
+    assert {row.verdict for row in small_signal(Bench(drive, drive).place("load"))} == {Verdict.MET}
+
+
 @pytest.mark.parametrize("more", ["", "angle", "output_angle", "output_speed", "twist"])
 def test_the_output_is_the_outermost_loop_where_its_angle_is_all_that_is_taken(more: str) -> None:
     """By name, held against the responses: joint's sensor is the output's."""

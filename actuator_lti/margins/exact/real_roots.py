@@ -12,10 +12,12 @@ from contextlib import suppress
 from functools import lru_cache
 from typing import Any
 
+import numpy as np
 from flint import arb, arb_poly, ctx, fmpz, fmpz_poly
 
 from actuator_lti.errors import NumericalError
 from actuator_lti.margins.exact.roots import FEW, all_roots, is_crowded
+from actuator_lti.types import Real
 
 _MOST_BITS = 1 << 15
 _PLACE = 40503  # over 2^16: intervals end at no number that a root is likely to be
@@ -69,7 +71,7 @@ def _separated(p: fmpz_poly, spans: Spans, most_bits: int) -> Iterator[tuple[arb
     if p.degree() < 1:
         return
     scaled = [int(c) for c in p(fmpz_poly([0, _PLACE])).coeffs()]  # of x = v 2^16 / _PLACE, times 2^(16 k)
-    sizes = [c.bit_length() - 16 * k for k, c in enumerate(scaled)]
+    sizes = np.array([c.bit_length() - 16.0 * k if c else -math.inf for k, c in enumerate(scaled)])
     bits, n = p.degree() + 64, p.degree()
     first, last = octaves(p)
     for octave in range(first, last + 1):
@@ -93,9 +95,9 @@ def octaves(p: fmpz_poly) -> tuple[int, int]:
     return math.floor(-low) - 1, math.ceil(high) + 1
 
 
-def _rounded(scaled: Sequence[int], sizes: Sequence[int], octave: int, bits: int) -> fmpz_poly:
+def _rounded(scaled: Sequence[int], sizes: Real, octave: int, bits: int) -> fmpz_poly:
     """The coefficients where x lies between 1 and 2 times 2^octave, each wrong by less than one."""
-    cut = max(size + octave * k for k, (c, size) in enumerate(zip(scaled, sizes, strict=True)) if c) - bits
+    cut = int((sizes + octave * np.arange(sizes.size)).max()) - bits
     moves = ((c, cut + (16 - octave) * k) for k, c in enumerate(scaled))
     return fmpz_poly([c >> move if move > 0 else c << -move for c, move in moves])
 
