@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from math import ceil
 from typing import Literal
 
 import numpy as np
@@ -11,8 +12,9 @@ from actuator_lti.bounds import BATCH_TICKS
 from actuator_lti.design.loader import AnyDesign, as_design
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
+from actuator_lti.loops import assemble_loops
 from actuator_lti.types import Floats
-from analyses.large_signal.tones import ELASTIC, PLACES
+from analyses.large_signal.tones import ELASTIC, PLACES, settled_ticks
 from analyses.limit_cycles import describing
 from analyses.motion.settling import Settling, noticed, settlings_of, verdict_of, waiver_of_rest
 from nonlinear import Rows
@@ -112,11 +114,15 @@ def confirm(design: Design, cycle: describing.Cycle) -> CycleResult:
         if name in _STARTS and (tried.coupling is not None or name not in ELASTIC):
             rows[_STARTS[name]] = SCALES * value.real
     rows["speed_command_start"] = SCALES * _speed_command(tried, cycle)
-    turn = _turn(rows, cycle, period)
+    watched = CYCLES_WATCHED // 3
+    if cycle.cause in describing.SENSORS:  # the start's counts push it off the edge, to which it comes back
+        left = cycle.inner_rad / (describing.quantum_of(design, cycle.cause) or np.inf)
+        watched += ceil(settled_ticks(assemble_loops(tried), min(left, 0.5)) / (3.0 * period))
+    turn = _turn(rows, cycle, period, watched)
     if turn is None:
         return CycleResult(cycle, None, None)
     row, ratio = rows.take(turn), float(np.sqrt(SCALES[turn] * SCALES[turn + 1]))
-    row["ticks"] = (CYCLES_WATCHED // 3 if cycle.stable else 1) * round(3.0 * period)
+    row["ticks"] = (watched if cycle.stable else 1) * round(3.0 * period)
     row["record_every"] = max(int(period) // MOMENTS, 1)
     run = row.trajectory()
     begin = run.time_s.size // 2 if cycle.stable else 0  # what other motion the start brings is gone by then
@@ -128,7 +134,7 @@ def confirm(design: Design, cycle: describing.Cycle) -> CycleResult:
     return CycleResult(cycle, ratio, hertz)
 
 
-def _turn(rows: Rows, cycle: describing.Cycle, period: float) -> int | None:
+def _turn(rows: Rows, cycle: describing.Cycle, period: float, watched: int) -> int | None:
     """Number of the size beyond which motion turns, of those where it does the nearest to the predicted.
 
     Every size is watched for two periods, and then, the nearest first, until one is found. Where friction
@@ -137,7 +143,7 @@ def _turn(rows: Rows, cycle: describing.Cycle, period: float) -> int | None:
     rows.window(round(period), 1, 0)
     drives = [rows.running(k) for k in range(len(rows))]
     slow = cycle.with_friction and CYCLES_WATCHED * period > MOST_WORK
-    if not slow:
+    if not slow and cycle.cause not in describing.SENSORS:
         size = _sizes(cycle, rows, drives, round(period), 2)
         if size.max() < SCALES[0] or size.min() == np.inf:  # all died out, or failed; the large may yet fall
             return None
@@ -146,7 +152,7 @@ def _turn(rows: Rows, cycle: describing.Cycle, period: float) -> int | None:
     for reach in range(2, middle + 1, 2):
         near = range(middle - reach, middle + reach + 1)
         new = [k for k in near if k not in known]
-        size = watch(cycle, rows.take(new), [drives[k] for k in new], window, CYCLES_WATCHED // 3)
+        size = watch(cycle, rows.take(new), [drives[k] for k in new], window, watched)
         grows[new], known = size > SCALES[new], near
         here = grows[near]
         turns = near.start + np.flatnonzero((here[1:] != here[:-1]) & (here[:-1] == cycle.stable))
