@@ -37,8 +37,8 @@ def test_every_margin_of_a_report_is_certified_and_the_page_says_so(survey):
 
 
 def test_a_withheld_margin_gives_its_reason(survey):
-    """Four poles 1e-4 from z = 1: rounding of the coefficients scatters them over the border."""
-    undetermined = control.tf([1e-14], np.poly([1.0 - 1e-4] * 4), 1e-4)
+    """(z - a)^4 + k, a four times 1e-4 from 1: stable below k = 4e-16, and its 6 a^2 is held to 9e-16."""
+    undetermined = control.tf([1e-16], np.poly([1.0 - 1e-4] * 4), 1e-4)
     loop = survey.figures["velocity"].loop
     result = LoopFigures(loop, None, stability_margins(undetermined, certify=True), None, None, None)
     assert result.margins.evidence == "withheld"
