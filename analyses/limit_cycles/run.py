@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from math import ceil
+from math import ceil, inf
 from typing import Literal
 
 import numpy as np
@@ -116,8 +116,8 @@ def confirm(design: Design, cycle: describing.Cycle) -> CycleResult:
     rows["speed_command_start"] = SCALES * _speed_command(tried, cycle)
     watched = CYCLES_WATCHED // 3
     if cycle.cause in describing.SENSORS:  # the start's counts push it off the edge, to which it comes back
-        left = cycle.inner_rad / (describing.quantum_of(design, cycle.cause) or np.inf)
-        watched += ceil(settled_ticks(assemble_loops(tried), min(left, 0.5)) / (3.0 * period))
+        part = min(cycle.inner_rad / (describing.quantum_of(design, cycle.cause) or inf), 0.5)
+        watched += ceil(settled_ticks(assemble_loops(tried), part) / (3.0 * period))
     turn = _turn(rows, cycle, period, watched)
     if turn is None:
         return CycleResult(cycle, None, None)
