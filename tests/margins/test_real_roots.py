@@ -18,7 +18,9 @@ def _of_any_degree(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(real_roots, "FEW", 0)
 
 
+AT_AN_END = [fmpq(40503, 2**14), *(fmpq(k, 4) for k in range(1, 20))]
 CASES = {
+    "at an end of an interval": (AT_AN_END, AT_AN_END),
     "none": ([], []),
     "negative": ([-3, -1, 0, 0], []),
     "one": ([2], [2]),
@@ -49,14 +51,6 @@ def test_chosen_roots(case: str, beside: list[int]) -> None:
         for (root, _), value in zip(found, sorted(set(positive)), strict=True):
             assert root.overlaps(arb(value))
             assert root.rel_accuracy_bits() >= 90
-
-
-def test_a_root_at_an_end_of_an_interval() -> None:
-    roots = [fmpq(40503, 2**14), *(fmpq(k, 4) for k in range(1, 20))]
-    with ctx.workprec(96):
-        found = positive_roots(of_roots(roots))
-    assert len(found) == 20
-    assert all(root.overlaps(arb(value)) for (root, _), value in zip(found, sorted(roots), strict=True))
 
 
 @pytest.mark.parametrize("seed", range(20))
