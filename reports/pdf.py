@@ -202,9 +202,14 @@ def _glance(block: Mapping[str, Any]) -> Tree:
 
 def _table(block: Mapping[str, Any]) -> Tree:
     columns: Sequence[Mapping[str, Any]] = block["columns"]
-    labels = (LINE_END.sub("\\g<0>\u200b", clean(c["label"], 120)) for c in columns)
-    looks = ({"unit": clean(c["unit"], 30), "align": c["align"]} for c in columns)
-    heads = [{"label": label, **look} for label, look in zip(labels, looks, strict=True)]
+    heads = [
+        {
+            "label": LINE_END.sub("\\g<0>\u200b", clean(c["label"], 120)),
+            "unit": clean(c["unit"], 30),
+            "align": c["align"],
+        }
+        for c in columns
+    ]
     rows = []
     for row in block["rows"]:
         cells = [_cell(row.get(c["key"]), c["format"]) for c in columns]

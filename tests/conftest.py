@@ -35,9 +35,8 @@ settings.register_profile("search", deadline=None, suppress_health_check=[Health
 settings.register_profile("same", settings.get_profile("search"), derandomize=True, database=None)
 settings.load_profile("same")
 
-os.fsync = (
-    os.fstat
-)  # nobody cuts the power: no test waits for the disk, one has its own to see what is flushed
+# Nobody cuts the power: no test waits for the disk; one has its own to see what is flushed.
+os.fsync = os.fstat
 
 SLOW = Path(__file__).with_name("slow.txt")
 BROWSERS = ("chromium", "chromium-browser", "google-chrome")

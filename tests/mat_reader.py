@@ -15,11 +15,8 @@ from actuator_lti.files import matlab
 
 def forked(*, input: bytes, timeout: float, args: Any, **_: object) -> CompletedProcess[bytes]:
     """In the place of `subprocess.run` in `actuator_lti.files.matlab`."""
-    with (
-        TemporaryFile() as out,
-        TemporaryFile() as err,
-        warnings.catch_warnings(action="ignore"),
-    ):  # of threads
+    # a fork beside threads warns
+    with TemporaryFile() as out, TemporaryFile() as err, warnings.catch_warnings(action="ignore"):
         process = multiprocessing.get_context("fork").Process(target=mat_reader, args=(input, out, err))
         process.start()
         process.join(timeout)

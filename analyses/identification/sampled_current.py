@@ -10,7 +10,6 @@ from analyses.records.record import Record
 
 TICK_TOLERANCE = 1e-3
 LARGEST_CHANGE = 0.2
-SLOW = 1e-4  # of a frequency that neither tick nor winding feels
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -44,9 +43,13 @@ class HeldVoltage:
 
     @property
     def lead_s(self) -> float:
-        """By how much the samples lead the current, at low frequency: as `mean_over_sample` lags."""
-        slow = SLOW / (self.period_s + 1.0 / self.rate_1_s)
-        return float(-np.angle(self.mean_over_sample(np.array([slow]))[0]) / slow)
+        """By how much the samples lead the current, at low frequency.
+
+        The current lags by ``d + T/2 + L/R``, the samples by ``T + T exp(-a (T - d))/(1 - exp(-a T))``.
+        """
+        a, T = self.rate_1_s, self.period_s
+        d = self.delay_s % T
+        return d - 0.5 * T + 1.0 / a + T * np.exp(-a * (T - d)) / np.expm1(-a * T)
 
 
 def held_s(design: Design) -> float:

@@ -17,9 +17,8 @@ from actuator_lti.errors import InputError
 from actuator_lti.files.reading import Tree
 
 MARK = "@@changed@@"
-_LINES = re.compile(
-    r'"""(?:\\.|.)*?"""|\'\'\'.*?\'\'\'', re.S
-)  # texts of several lines: no heads stand in them
+# Texts of several lines: no heads stand in them.
+_LINES = re.compile(r'"""(?:\\.|.)*?"""|\'\'\'.*?\'\'\'', re.S)
 Patch = tuple[int, int, str, str]
 """What a changed value replaces: the characters from, to; what stands before it, and behind."""
 

@@ -119,9 +119,11 @@ def _percent(part: float, *, signed: bool = False) -> str:
 
 def _best(comparison: Comparison) -> doc.Block:
     heads = {"what": "Requirement", "limit": "Limit", "best": "Best", "value": "Value", "base": "Base"}
-    right = ("value", "base")
-    columns = [doc.column(key, words, align="right" if key in right else "left")
-               for key, words in (heads | {"worst": "Worst"}).items()]  # fmt: skip
+    heads["worst"] = "Worst"
+    columns = [
+        doc.column(key, words, align="right" if key in ("value", "base") else "left")
+        for key, words in heads.items()
+    ]
     rows = []
     for wanted in comparison.base.verdicts:
         found = [(nearness(v), one.variant.name, v) for one, v in _judged(comparison, wanted)]

@@ -129,10 +129,9 @@ def test_what_8_ulp_decide_is_withheld() -> None:
     assert (m.stable, m.verdict) == (None, "undecided")
     assert (m.gain_margin_db, m.phase_margin_deg, m.delay_margin_s, m.modulus_margin) == (None,) * 4
     assert "evidence: withheld" in str(m)
-    limit = stability_margins(control.tf([1.0], [1.0, -0.5], PERIOD_S), delay_s=0.3 * PERIOD_S).gain_margins[
-        0
-    ]
-    late = stability_margins(control.tf([limit.ratio], [1.0, -0.5], PERIOD_S), delay_s=0.3 * PERIOD_S)
+    loop, delay_s = control.tf([1.0], [1.0, -0.5], PERIOD_S), 0.3 * PERIOD_S
+    limit = stability_margins(loop, delay_s).gain_margins[0].ratio
+    late = stability_margins(limit * loop, delay_s)
     assert late.evidence == "withheld"
     assert "not resolved in double precision" in late.evidence_reason
 

@@ -9,7 +9,7 @@ from actuator_lti.margins.assemble import FARTHEST, Crossing, Figures, assembled
 from actuator_lti.margins.delays.axis import IMAGINARY, NOWHERE, Axis, Form, smallest, turn, zeros
 from actuator_lti.margins.delays.exact import ExactDelayLoop
 from actuator_lti.margins.distances import DISK, MODULUS, Distance, Place
-from actuator_lti.margins.exact.decided import ACROSS, Crossings, Shared, hidden_notes, settled
+from actuator_lti.margins.exact.decided import ACROSS, Crossings, Shared, counted, hidden_notes, settled
 from actuator_lti.margins.results import StabilityMargins
 from actuator_lti.margins.single import Agreement
 from actuator_lti.margins.tail import listed, tail_note
@@ -38,14 +38,16 @@ def certified_delayed_margins(
     with ctx.workprec(_BITS):
         axes = [Axis(loop) for loop in loops]
         counts = [_unstable(axis) for axis in axes]
+        notes = counted(counts)
         found, figures = Shared((), ()), None
         lists = [_reals(axis, band) for axis in axes]
-        if len(set(counts)) == 1:
+        if notes is not None:
             reals = [each[0] for each in lists]
             found = settled(lambda merge: [(_gains(a, merge), r) for a, r in zip(axes, reals, strict=True)])
             near = [smallest(axes[0], d, _known(d, found.reals, start)) for d in (MODULUS, DISK)]
             figures = Figures(found.gains, found.reals, near)
     hidden, (_, listed_to, gain) = loops[0].hidden, lists[0]
+    tail = tail_note(listed_to, gain) if band is None else ()
     unstable = counts[0] + hidden.right  # proven by the turn of N + D; double precision's stands beside it
     second = None if start is None else start.agreement.unstable_nyquist
     return assembled(
@@ -53,7 +55,7 @@ def certified_delayed_margins(
         Agreement(unstable, second if second == unstable else None) if figures else Agreement(None, None),
         figures,
         method=_METHOD,
-        notes=(*hidden_notes(hidden), *found.notes, *(tail_note(listed_to, gain) if band is None else ())),
+        notes=(*hidden_notes(hidden), *found.notes, *(notes or ()), *tail),
         evidence="certified",
         reason=f"{_REASON}; {found.moved_text}" if figures else ACROSS,
         delay_s=delay_s,

@@ -48,6 +48,17 @@ class Shared:
         return tuple(note for note in (self.dropped and left_out, self.unsure) if note)
 
 
+def counted(unstable: Sequence[int]) -> tuple[str, ...] | None:
+    """Notes on the unstable poles of a loop and its neighbours; ``None`` where only some of them have any.
+
+    >>> counted([2, 2, 2]), counted([1, 2, 3]) == (COUNTED,), counted([0, 2, 1])
+    ((), True, None)
+    """
+    if len(set(unstable)) == 1:
+        return ()
+    return (COUNTED,) if min(unstable) else None
+
+
 def settled(lists: Callable[[bool], Sequence[Lists]]) -> Shared:
     """What a loop and its neighbours share; with what is merged where they do not share it otherwise."""
     found = shared(*lists(False))

@@ -16,7 +16,7 @@ from actuator_lti.margins.along import Along
 from actuator_lti.margins.checked import passed_into, refuse_neutral
 from actuator_lti.margins.distances import Distance, Place
 from actuator_lti.margins.exact.certified import certified_margins
-from actuator_lti.margins.exact.decided import ACROSS, COUNTED, hidden_notes, shared
+from actuator_lti.margins.exact.decided import ACROSS, counted, hidden_notes, shared
 from actuator_lti.margins.exact.loop import ExactLoop, exact_loop, neighbours
 from actuator_lti.margins.factored import with_delay
 from actuator_lti.margins.given import ULP, Given
@@ -69,8 +69,8 @@ def late_margins(given: Given, delay_s: float, band: tuple[float, float] | None)
         pairs = zip(near, delays, strict=True)
         base, *others = [_found(each, given.period_s, delay, band, one) for each, delay in pairs]
     found, nyquist, poles = base
-    counts = {nyquist, *(other for _, other, _ in others)}
-    if len(counts) > 1 and 0 in counts:
+    notes = counted([nyquist, *(other for _, other, _ in others)])
+    if notes is None:
         raise Doubtful(ACROSS)
     common = shared(*((each.gains, each.reals) for each, *_ in (base, *others)))
     hidden = loop.hidden_modes
@@ -78,7 +78,7 @@ def late_margins(given: Given, delay_s: float, band: tuple[float, float] | None)
         Agreement(None if poles is None else poles + hidden.right, nyquist + hidden.right),
         f"zeros and poles certified, intervals leave no crossing out; {common.moved_text}",
         delay_s,
-        (*hidden_notes(hidden), *common.notes, *([COUNTED] if len(counts) > 1 else [])),
+        (*hidden_notes(hidden), *common.notes, *notes),
         hidden.at_limit + loop.hidden_at_end,
         common.reals,
     )
