@@ -19,7 +19,8 @@ from analyses.specification.weakest import View, WeakPoint, limit_of, views
 from analyses.tuning.problem import GAINS, SPAN
 from analyses.tuning.start import allowed_range
 
-STEPS = 36  # on either side, and once more between the last that does not mend and the first that does
+STEPS = 36  # on either side
+HALVINGS = 6  # of the step to the first that mends
 AT_ONCE = 12  # values
 
 
@@ -55,16 +56,21 @@ def mending(point: WeakPoint, survey: LoopSurvey, corners: Corners | None = None
     if not point.view.loop or point.view.rotor == "locked":
         return None
     others = [each for each in views(survey, corners) if each.loop and each.rotor != "locked"]
-    mended = _by_point([point.view, *(each for each in others if each.stable is False)])
+    mended = [[point.view], *_by_point(each for each in others if each.stable is False)]
     least: Move | None = None
     for path, was, end in _ways(survey.design):
         steps = np.geomspace(was, end, STEPS + 1)
         within = steps if least is None else steps[np.abs(np.log(steps / was)) < least.change]
         if not (first := _first(mended, survey.design, path, within)):
             continue
-        between = np.geomspace(steps[first - 1], steps[first], STEPS + 1)
-        place = _first(mended, survey.design, path, between) or STEPS
-        move = Move(path, was, _written(float(between[place]), was))
+        before, value = steps[first - 1], steps[first]
+        for _ in range(HALVINGS):
+            middle = np.sqrt(before * value)
+            if _first(mended, survey.design, path, np.array([middle])) is None:
+                before = middle
+            else:
+                value = middle
+        move = Move(path, was, _written(float(value), was))
         if (least is None or move.change < least.change) and _harmless(move, others, survey.design):
             least = move
     return least
