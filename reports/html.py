@@ -64,7 +64,7 @@ def _live(made: Mapping[str, Any]) -> Tree:
 
     # within a script element only "<" could end it; JSON may write it otherwise
     data = json.dumps(known, allow_nan=False, separators=(",", ":")).replace("<", "\\u003c")
-    drawn = live_charts(str(known["step"]["unit"]), known["axis"], electrical=known["electrical"])
+    drawn = live_charts(str(known["step"]["unit"]), known["axis"], known["ampere"])
     return {
         "live": Markup(data),
         "module": base64.b64encode(kept_wasm()).decode(),

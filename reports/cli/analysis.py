@@ -142,7 +142,7 @@ def answer(
     for warning in (*own, *_kept_gains(getattr(subject, "variants", ()))):
         print_warning(warning)
     if (text := one.shows("text", lambda _: None)(result)) is not None:
-        print_line(text)
+        print_json({"design": text}) if as_json else print_line(text)
         return
     parts = [*notices(missing, one.name), *in_amperes(one.sections(result), drive)]
     if drive is not None:

@@ -32,7 +32,7 @@ def build() -> typer.Typer:
         name="actuator-lti", no_args_is_help=True, pretty_exceptions_enable=False, rich_markup_mode="rich",
         context_settings={"help_option_names": ["-h", "--help"]},
     )  # fmt: skip
-    app.callback()(about)
+    app.callback(help=flowed(about.__doc__ or ""))(about)
     for panel, commands in PANELS.items():
         for command in commands:
             own = [one for one in ANALYSES if one.name.split()[0] == command]

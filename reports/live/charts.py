@@ -20,8 +20,8 @@ FOLLOWED: style.Style = {"width": style.HALF, "loop": "live"}  # the loop whose 
 ONSETS = {one.words: COLOURS[name] for name, one in LIMITERS.items() if line_of(one) is not None}
 
 
-def live_charts(unit: str, axis: Axis = "rotary", *, electrical: bool = True) -> dict[str, str]:
-    """Give each figure's SVG by its name; ``unit`` is that of the command, ``electrical``: with a current."""
+def live_charts(unit: str, axis: Axis = "rotary", ampere: str = "A") -> dict[str, str]:
+    """Give each figure's SVG by its name; ``unit`` is that of the command, ``ampere`` of the current, if any."""
     both = "as designed and as changed"
     bode = _over_frequency(
         370.0, (1.15, 1.0), partial(_both, measured=True), (-60.0, 40.0, 0.0), (-360.0, 0.0, -180.0)
@@ -35,7 +35,7 @@ def live_charts(unit: str, axis: Axis = "rotary", *, electrical: bool = True) ->
         "sensitivity": (_sensitivity(), f"Sensitivity S and closed loop T, {both}."),
         "step": (_step(), f"Step response of the linear loop, {both}."),
         "difference": (difference, "Measured frequency response over the model as changed."),
-        "run": (_run(unit, axis, electrical), f"Run with limits and friction, {both}, and a record."),
+        "run": (_run(unit, axis, ampere), f"Run with limits and friction, {both}, and a record."),
         "linear-limit": (_linear_limit(unit), f"Command amplitude at which a limit is reached, {both}."),
     }
     return {name: page_svg(made, f"live-{name}", words) for name, (made, words) in drawn.items()}
@@ -97,11 +97,11 @@ def _step() -> Chart:
     return chart
 
 
-def _run(unit: str, axis: Axis, electrical: bool) -> Chart:
-    traces = {"w": "speed", **({"i": "current"} if electrical else {}), "u": "voltage"}
-    labels = [f"output, {unit}"]
-    labels += [f"{words}, {SIGNALS[name].unit_for(axis)}" for name, words in traces.items()]
-    chart, panels = style.stack(170.0 + 105.0 * len(traces), *([1.5] + [1.0] * len(traces)), width=style.HALF)
+def _run(unit: str, axis: Axis, ampere: str) -> Chart:
+    labels = [f"output, {unit}", f"speed, {SIGNALS['w'].unit_for(axis)}"]
+    labels += [f"current, {ampere}"] * bool(ampere) + ["voltage, V"]
+    more = len(labels) - 1
+    chart, panels = style.stack(170.0 + 105.0 * more, *([1.5] + [1.0] * more), width=style.HALF)
     panels[0].curve(*EMPTY, "command", colour=style.INK, width=1.0)
     panels[0].curve(*EMPTY, "measured record", colour=style.ORANGE, width=2.6, opacity=0.6)
     panels[0].curve(*EMPTY, "residual", colour=style.RED, width=1.2)

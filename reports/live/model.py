@@ -13,6 +13,7 @@ from actuator_lti.asked.quantities import (
     shown_unit,
 )
 from actuator_lti.design.model import Design, Requirement
+from actuator_lti.design.units import ampere_unit
 from actuator_lti.drive.profile import command_mean
 from actuator_lti.drive.signals import LIMITERS
 from actuator_lti.errors import InputError
@@ -54,6 +55,7 @@ def live_model(design: Design, source: str | None = None) -> Tree:
     relations = relation_statements(design, {key["path"]: key["value"] for key in result.free})
     text, places = patches(design, result.free, source)
     requirements, apart = _judged(design, result.figures)
+    ampere = ampere_unit("limits.", "A", design.motor.constants)
     outer = page.EVERY_POSITION if design.controller.position else page.EVERY_VELOCITY
     return {
         "name": design.name,
@@ -71,7 +73,7 @@ def live_model(design: Design, source: str | None = None) -> Tree:
         "turned": page.turned_rows(design),
         "held": HELD,
         "relations": [[statement.data for statement in check] for check in relations],
-        "electrical": design.motor.has_electrical_dynamics,
+        "ampere": ampere * design.motor.has_electrical_dynamics,
         "limiters": [[name, bit, LIMITERS[name].words, LIMITERS[name].signal] for name, bit in page.LIMITERS],
         "quantities": list(LOOP_QUANTITIES),
         "figures": [_column(each) for each in LOOP_QUANTITIES.values() if each.followed],

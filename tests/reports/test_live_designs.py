@@ -18,6 +18,7 @@ from analyses.linear.loop_survey import operating_points
 from nonlinear import Rows
 from nonlinear.export.trace import Tape, reached
 from reports.as_json import loop_json
+from reports.live.charts import live_charts
 from reports.live.model import live_model
 from tests.reports import test_held_loops
 from tests.validation.random_drives import full_drive
@@ -204,6 +205,12 @@ def test_a_requirement_that_needs_a_simulation_of_its_own_is_named() -> None:
     limits = (Requirement(id="swing", quantity="limit_cycle", unit="deg", maximum=0.1),)
     model = live_model(replace(AMBER, requirements=limits))
     assert (model["apart"], model["requirements"]) == ([{"id": "swing", "words": "swing after a step"}], [])
+
+
+@pytest.mark.parametrize(("name", "unit"), [("ballscrew", "A dc"), ("ilr33-amber", "A"), ("emps", "")])
+def test_the_run_says_which_amperes_or_has_no_current(name: str, unit: str) -> None:
+    drawn = live_charts("deg", "rotary", live_model(load_design(name))["ampere"])
+    assert (f">current, {unit}<" in drawn["run"]) == ("current" in drawn["run"]) == bool(unit)
 
 
 def test_a_speed_is_commanded_in_the_unit_of_simulate() -> None:

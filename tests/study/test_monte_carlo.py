@@ -263,6 +263,7 @@ def test_a_study_that_fails_says_so_and_can_be_accepted(cli, wide, tmp_path):
 def test_one_sample_is_printed_as_a_design_and_json_goes_to_standard_output_alone(cli, wide, tmp_path):
     first, again, other = (cli.text("montecarlo", wide, "--sample", 41, "--seed", seed) for seed in (2, 2, 3))
     assert first == again != other
+    assert cli.data("montecarlo", wide, "--sample", 41, "--seed", 2) == {"design": first.rstrip("\n")}
     path = tmp_path / "sample.toml"
     path.write_text(first)
     assert 0.4 * 1.34e-3 <= load_design(path).friction.load_coefficient <= 1.6 * 1.34e-3

@@ -10,7 +10,7 @@ import { choice, digits, html, labelled, refused, swatch, typed } from "./words.
 const { size: usual, unit: unitIn, factor } = data.step;
 /** @type {any} */
 export const trial = { kind: "step", size: usual, hertz: 1, rate: 1, moment: 0, moving: 0, before: 0, chosen: 0, length: 0, span: 0, designed: null };
-const TRACES = ["output", "speed", ...(data.electrical ? ["current"] : []), "voltage"];
+const TRACES = ["output", "speed", ...(data.ampere ? ["current"] : []), "voltage"];
 const MOST = 60000, GROWTH = 6; // ticks of a run; how far beyond the run as designed the axes follow one that grows
 const held = (rec, T) => {
   let place = 0;
