@@ -21,7 +21,7 @@ ONSETS = {one.words: COLOURS[name] for name, one in LIMITERS.items() if line_of(
 
 
 def live_charts(unit: str, axis: Axis = "rotary", ampere: str = "A") -> dict[str, str]:
-    """Give each figure's SVG by its name; ``unit`` is that of the command, ``ampere`` of the current, if any."""
+    """Give each figure's SVG by its name; ``unit`` of the command, ``ampere`` of the current, if any."""
     both = "as designed and as changed"
     bode = _over_frequency(
         370.0, (1.15, 1.0), partial(_both, measured=True), (-60.0, 40.0, 0.0), (-360.0, 0.0, -180.0)
