@@ -28,6 +28,7 @@ from actuator_lti.loops.walk import INPUTS, Program, Walk
 from actuator_lti.systems.resolvent import LARGE, states_at
 from actuator_lti.systems.rest_mode import without_rest_mode
 
+_BESIDE = 1.0 + 2.0**-50
 
 @dataclass(frozen=True)
 class Tick:
@@ -287,7 +288,10 @@ def _solved(A: Any, right: np.ndarray, points: np.ndarray) -> np.ndarray:
     """(p - A)^-1 right at points (..., 1, 1); of stacked designs with many states one after the other."""
     n = A.shape[-1]
     if n < LARGE:
-        return np.asarray(np.linalg.solve(points * np.eye(n) - A, right))
+        try:
+            return np.asarray(np.linalg.solve(points * np.eye(n) - A, right))
+        except np.linalg.LinAlgError:  # a pole is met to the last bit
+            return np.asarray(np.linalg.solve(_BESIDE * points * np.eye(n) - A, right))
     A, points = (np.broadcast_to(each, (*right.shape[:-2], *each.shape[-2:])) for each in (A, points))
     parts = zip(
         A[..., 0, :, :].reshape(-1, n, n),

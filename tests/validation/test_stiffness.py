@@ -256,6 +256,19 @@ def test_the_least_stiffness_of_a_weakly_damped_mass_is_no_number_of_a_grid(spri
     assert hertz == pytest.approx(truth.x / (2.0 * np.pi), rel=1e-6)
 
 
+@pytest.mark.parametrize("arm", np.linspace(0.1, 3.0, 30))
+def test_the_least_stiffness_of_an_undamped_mass_is_none(arm: float) -> None:
+    """An unpowered pendulum without friction swings by itself; some meet the pole to the last bit."""
+    load = Load(
+        inertia_kgm2=1e-3, path="back-drivable", gravity=Gravity(mass_kg=0.1, arm_m=arm, offset_rad=np.pi)
+    )
+    design = changed(drive_e(), load=load, coupling=None, friction={"viscous_Nms_rad": 0.0})
+    J = 1e-3 + 10.0**2 * design.motor.rotor_inertia_kgm2
+    least, hertz = stiffness_curves(design)[2].least
+    assert least < 1e-9 * 0.1 * 9.80665 * arm
+    assert hertz == pytest.approx(np.sqrt(0.1 * 9.80665 * arm / J) / (2.0 * np.pi), rel=1e-6)
+
+
 def test_a_load_chooses_the_piece_of_a_spring_that_bends() -> None:
     """A velocity integral holds the motor: K1 at rest, K3 beyond torque_2, less the slope of the moment."""
     bends = {"torque_1_Nm": 2.0, "stiffness_2_Nm_rad": 600.0, "torque_2_Nm": 5.0, "stiffness_3_Nm_rad": 900.0}
