@@ -30,6 +30,7 @@ from actuator_lti.systems.rest_mode import without_rest_mode
 
 _BESIDE = 1.0 + 2.0**-50
 
+
 @dataclass(frozen=True)
 class Tick:
     """``x+ = A x + B v`` over one tick, and the rows (over x, v) of the signals at its start."""
