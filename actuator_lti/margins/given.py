@@ -52,21 +52,37 @@ class Given:
         return ("numerator", "denominator") if self.A is None else ("A", "b", "c", "d")
 
     def neighbours(self) -> tuple[Given, Given]:
-        """The same with every entry moved by 8 ulp, up or down at random, and the other way; zeros stay.
+        """The same with every entry moved by 8 ulp, up or down, and the other way; zeros stay.
 
         To first order whatever the one does the other undoes: between them lies what the data decide.
         """
         names = self.entries
-        up, down = (moved(way, *(getattr(self, name) for name in names)) for way in (1.0, -1.0))
+        ways = self._ways_at_the_limit()
+        up, down = (moved(way, *(getattr(self, name) for name in names), ways=ways) for way in (1.0, -1.0))
         pairs: Any = [dict(zip(names, entries, strict=True)) for entries in (up, down)]
         return replace(self, **pairs[0]), replace(self, **pairs[1])
 
+    def _ways_at_the_limit(self) -> Real | None:
+        """Up or down for every coefficient of z, where 8 ulp decide on which side of z = 1 or -1 a pole lies.
 
-def moved(way: float, *entries: Any) -> list[Any]:
-    """Arrays and numbers with every entry moved by 8 ulp, see `Given.neighbours`."""
+        The sign of N + D there tells the side, and these move N + D most. ``None`` where they do not decide.
+        """
+        if self.period_s is None or self.A is not None:
+            return None
+        powers = [np.arange(part.size)[::-1] for part in (self.numerator, self.denominator)]
+        coefficients = np.concatenate((self.numerator, self.denominator))
+        for z in (1.0, -1.0):
+            terms = coefficients * z ** np.concatenate((powers[0], powers[1] + self.samples))
+            if abs(math.fsum(terms)) <= ULP * math.fsum(np.spacing(np.abs(terms))):
+                return np.sign(terms)
+        return None
+
+
+def moved(way: float, *entries: Any, ways: Real | None = None) -> list[Any]:
+    """Arrays and numbers with every entry moved by 8 ulp, at random where no ``ways`` are given."""
     arrays = [np.asarray(each, dtype=float) for each in entries]
     ends = np.cumsum([x.size for x in arrays])
-    signs = np.split(_signs(int(ends[-1])), ends[:-1])
+    signs = np.split(_signs(int(ends[-1])) if ways is None else ways, ends[:-1])
     return [
         x + way * ULP * np.spacing(x) * sign.reshape(x.shape) * (x != 0.0)
         for x, sign in zip(arrays, signs, strict=True)

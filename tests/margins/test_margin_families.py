@@ -63,6 +63,16 @@ def test_a_pole_that_rounding_carries_over_the_limit_is_not_said_to_be_on_it(k: 
             assert m.agreement.unstable_poles is None
 
 
+@pytest.mark.parametrize("samples", [1, 2, 3])
+def test_a_pole_at_rest_that_8_ulp_carry_over_the_limit_is_judged_alike_in_every_form(samples: int) -> None:
+    """Random neighbours of the coefficients had all kept it on one side, those of the state space had not."""
+    loop = integrators_and_whole_samples(np.random.default_rng([39005, 1871]))
+    late = control.tf(loop.num[0][0], [*loop.den[0][0], *np.zeros(samples)], loop.dt)
+    assert truth_of(towards_the_limit(late)).unstable != truth_of(late).unstable
+    behind = (stability_margins(form, delay_s=samples * loop.dt) for form in (loop, control.ss(loop)))
+    assert len({(m.stable, m.agreement.unstable_poles) for m in (stability_margins(late), *behind)}) == 1
+
+
 @pytest.mark.parametrize(
     ("k", "use"), [(2000178, 1), (2000625, 1), (2002044, 1), (2001516, 1), (1002855, 2), (1006074, 2)]
 )
