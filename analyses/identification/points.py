@@ -35,10 +35,11 @@ class SteadyPoint:
 
 def steady_point(run: ImportedRun, torque_constant_Nm_A: float) -> SteadyPoint:
     """Average the steady part of one run; M = kM i (paper, section 3)."""
-    window = find_steady_window(run.record.time_s, run.record["speed"])
-    part = run.record.slice(window.start, window.stop)
+    record = run.record
+    load = np.zeros(len(record.time_s)) if run.load_is_zero else record["torque"]
+    window = find_steady_window(record.time_s, record["speed"], load=load)
+    part, load = record.slice(window.start, window.stop), load[window.start : window.stop]
     speed = part["speed"]
-    load = np.zeros(len(speed)) if run.load_is_zero else part["torque"]
     direction, side = 1 if speed.mean() > 0.0 else -1, 1.0 if load.mean() >= 0.0 else -1.0
     torque = direction * torque_constant_Nm_A * part["current"]
     means = correlated_means(np.column_stack([torque, direction * speed, side * load]))

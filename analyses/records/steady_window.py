@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from actuator_lti.errors import InputError
 from actuator_lti.types import Floats
@@ -26,7 +27,7 @@ class SteadyCriterion:
     def __str__(self) -> str:
         said = f"slope of the speed over {self.window_s:g} s at most {100 * self.relative_per_s:g} % of the "
         said += f"plateau per second (or {self.noise_factor:g} standard deviations of its noise), "
-        return said + f"longest stretch, {self.trim_s:g} s cut off at both ends"
+        return said + f"longest stretch, under its load, {self.trim_s:g} s cut off at both ends"
 
 
 CRITERION = SteadyCriterion()
@@ -45,9 +46,13 @@ class SteadyWindow:
 
 
 def find_steady_window(
-    time_s: Floats, speed_rad_s: Floats, criterion: SteadyCriterion = CRITERION
+    time_s: Floats, speed_rad_s: Floats, criterion: SteadyCriterion = CRITERION, load: Floats | None = None
 ) -> SteadyWindow:
-    """The steady part of a run, which may be sampled irregularly."""
+    """The steady part of a run, which may be sampled irregularly.
+
+    Of a ``load`` that comes or goes in steady motion it is the part under load: where its mean over the
+    criterion's window is above half of its plateau, if that is long enough.
+    """
     period = float(np.median(np.diff(time_s)))
     samples = max(round(criterion.window_s / period), 4)
     if len(time_s) < 2 * samples:
@@ -60,14 +65,25 @@ def find_steady_window(
     limit = max(criterion.relative_per_s * plateau, criterion.noise_factor * (noise / period))
     half, trim = samples // 2, round(criterion.trim_s / period)
     moving = np.abs(speed_rad_s[half : half + len(slope)]) >= criterion.least_share * plateau
-    start, stop = longest((np.abs(slope) <= limit) & moving)
+    calm, least = (np.abs(slope) <= limit) & moving, max(criterion.least_duration_s / period, 8.0)
+    start, stop = longest(calm)
+    if load is not None and np.any(calm):
+        loaded = longest(calm & _under_load(load, calm, samples))
+        start, stop = loaded if loaded[1] - loaded[0] - 2 * trim >= least else (start, stop)
     start, stop = start + half + trim, stop + half - trim
-    if stop - start < max(criterion.least_duration_s / period, 8.0):
+    if stop - start < least:
         calmest = float(np.min(np.abs(slope[moving]), initial=np.inf))
         why = f"the smallest acceleration is {calmest:.3g} rad/s2, the limit {limit:.3g} rad/s2"
         raise InputError(f"no steady part of {criterion.least_duration_s:g} s: {why}")
     largest = float(np.max(np.abs(slope[start - half : stop - half])))
     return SteadyWindow(start, stop, float(time_s[start]), float(time_s[stop - 1]), float(limit), largest)
+
+
+def _under_load(load: Floats, calm: NDArray[np.bool_], samples: int) -> NDArray[np.bool_]:
+    """Where the mean over the samples around is above half of its plateau, the 95 % point in calm motion."""
+    total = np.concatenate([[0.0], np.cumsum(load)])
+    mean = np.abs(total[samples:] - total[:-samples]) / samples
+    return np.asarray(mean >= 0.5 * np.quantile(mean[calm], 0.95))
 
 
 def moving_slope(time_s: Floats, values: Floats, samples: int) -> Floats:

@@ -9,6 +9,7 @@ from scipy.signal import lfilter
 from actuator_lti.design import load_design
 from analyses.estimation.series import correlated_means, correlation_time
 from analyses.identification.inverse import fit_records
+from analyses.identification.points import steady_point
 from analyses.identification.residuals import LEVEL, ResidualTest, residual_tests
 from analyses.identification.sampled_current import HeldVoltage
 from analyses.records.campaign_file import Campaign, Instruments, Join, RunEntry
@@ -165,6 +166,21 @@ def test_a_load_that_comes_after_the_motion_tells_its_clock_by_the_current(metho
     assert run.join.offset_std_s < 0.01
     assert np.interp(1.1 + later, run.record.time_s, run.record["torque"]) == pytest.approx(-1.5, abs=0.15)
     assert run.join.first_signal == ("current" if later else "speed")
+
+
+@pytest.mark.parametrize("later", [0.0, 0.4, 1.5])
+def test_a_load_that_comes_in_steady_motion_is_averaged_where_it_acts(later: float) -> None:
+    """3 N m and 0.35 A; 1.5 s late it was 2.4 N m, the time before it counted in, and the run set aside."""
+    point = steady_point(_joined(later), 1.0)
+    assert point.load_Nm == pytest.approx(3.0, rel=0.01)
+    assert point.torque_Nm == pytest.approx(0.2 + 0.05 * 3.0, abs=3e-3)
+
+
+def test_a_load_that_is_only_noise_shortens_no_steady_part() -> None:
+    time, speed = np.arange(0.0, 8.0, 1e-3), np.full(8000, 200.0)
+    noise = np.random.default_rng(2).standard_normal(8000)
+    both = (find_steady_window(time, speed, load=load) for load in (noise, np.zeros(8000)))
+    assert all(window == find_steady_window(time, speed) for window in both)
 
 
 @pytest.mark.parametrize("drift", [-0.05, 0.05])
