@@ -137,7 +137,7 @@ def test_what_8_ulp_decide_is_withheld() -> None:
 
 
 def test_a_crossing_that_8_ulp_decide_is_that_of_the_doubles_and_noted() -> None:
-    loop = control.tf([1e-14], np.poly([1 - 1e-4] * 4), PERIOD_S)
+    loop = control.tf([1e-13], np.poly([1 - 1e-4] * 4), PERIOD_S)
     m, near = stability_margins(loop), [moved(loop, np.random.default_rng(k)) for k in range(30)]
     assert m.verdict == "unstable"
     assert all(truth_of(other).unstable for other in near)
