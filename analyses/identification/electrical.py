@@ -14,6 +14,7 @@ from analyses.estimation.least_squares import identifiable, scaled_lstsq, solve,
 from analyses.estimation.parameters import parameter
 from analyses.identification.joint_model import JointModel, Recipe
 from analyses.identification.rows import motion_of, recipe_for, stands
+from analyses.identification.sampled_current import acts_later_s
 from analyses.records.differentiation import central_difference
 from analyses.records.inputs import lacking
 from analyses.records.record import Record, period_of
@@ -42,14 +43,14 @@ def fit_electrical(
     """Fit the voltage equation to records of voltage, current and motion.
 
     All signals pass the same filter without phase, by default that of each record's period. The recorded
-    voltage is the drive's own, which acts later by the design's computing delay and half a tick; what this
-    shift does to the values is an error of theirs. The inductance is not told where it is not five times its
-    standard error (a record sampled too slowly, or too calm, does not show it) or what a current that is late
-    by ``late_s`` (a filter, another clock) makes of it, R times that; the others are found beside it.
+    voltage is the drive's own, which acts later (`acts_later_s`); what this shift does to the values is an
+    error of theirs. The inductance is not told where it is not five times its standard error (a record
+    sampled too slowly, or too calm, does not show it) or what a current that is late by ``late_s`` (a filter,
+    another clock) makes of it, R times that; the others are found beside it.
     """
-    control = design.controller
-    shifts = control.computing_delay_s + 0.5 * control.period_s, 0.0
-    late, early = ([_rows(design, record, recipe, shift) for record in records] for shift in shifts)
+    late, early = (
+        [_rows(design, record, recipe, later=later) for record in records] for later in (True, False)
+    )
     whole = _fitted(late, early, NAMES)
     if "inductance" not in whole.names:
         return whole
@@ -136,9 +137,8 @@ def without_own_bias(
     simulated = model.simulated
     if not simulated:
         return fit
-    control, columns, motor = start.controller, fit.columns, start.effective_motor
-    shift = control.computing_delay_s + 0.5 * control.period_s
-    own, other = ([_rows(start, one, recipe, shift) for one in these] for these in (records, simulated))
+    columns, motor = fit.columns, start.effective_motor
+    own, other = ([_rows(start, one, recipe) for one in these] for these in (records, simulated))
     own = [table[: len(like)] for table, like in zip(own, other, strict=True)]  # the part that is simulated
     truth = motor.resistance_ohm, motor.back_emf_constant_Vs_rad, motor.inductance_H, 0.0
     known = {name: value or 0.0 for name, value in zip(NAMES, truth, strict=True)}
@@ -161,18 +161,19 @@ def without_own_bias(
     )
 
 
-def _rows(design: Design, record: Record, recipe: Recipe | None, late_s: float) -> Floats:
-    """Columns i, w, di/dt, 1 and u of one record, filtered alike; u as it acts, ``late_s`` later."""
+def _rows(design: Design, record: Record, recipe: Recipe | None, *, later: bool = True) -> Floats:
+    """Columns i, w, di/dt, 1 and u of one record, filtered alike; u as it acts, later than its row."""
     for name in ("voltage", "current"):
         if name not in record.signals or not record[name] @ record[name] > 0.0:
             raise lacking(record, f"no {name}: voltage, current and motion are needed")
-    recipe, period = recipe or recipe_for(record), period_of(record)
-    speed = motion_of(record.drive(design), record, recipe)[0].velocity
+    recipe, period, drive = recipe or recipe_for(record), period_of(record), record.drive(design)
+    speed = motion_of(drive, record, recipe)[0].velocity
     if stands(design, record, recipe):  # as a regressor its noise would make kE about 0
         speed = np.zeros_like(speed)
     b, a = butter(recipe.filter_order, 2.0 * recipe.cutoff_hz * period)
     current, voltage = (np.asarray(filtfilt(b, a, record[name])) for name in ("current", "voltage"))
-    voltage = np.interp(record.time_s - late_s, record.time_s, voltage)
+    if later:
+        voltage = np.interp(record.time_s - acts_later_s(drive, record), record.time_s, voltage)
     rate = central_difference(current, period)
     table = np.column_stack([current, speed, rate, np.ones_like(current), voltage])
     skip = recipe.skip_samples

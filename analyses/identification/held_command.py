@@ -26,7 +26,7 @@ from analyses.estimation.parameters import default_value, parameter
 from analyses.identification import to_design
 from analyses.identification.electrical import NAMES, SHOWN, ElectricalFit, kept_inductance
 from analyses.identification.joint_model import JointModel
-from analyses.identification.output_error import ITERATIONS, fit_output, simulated_part
+from analyses.identification.output_error import ITERATIONS, fit_output, simulated_part, values_of
 from analyses.identification.own_bias import same_fit, with_model_signals, with_noise
 from analyses.records.record import Record
 
@@ -92,7 +92,7 @@ class _Likeliest:
 
     def away(self, other: _Likeliest) -> Floats:
         """By what the values of another search are off these, as a covariance."""
-        moved = _values(other.design, self.keys) - _values(self.design, self.keys)
+        moved = values_of(other.design, self.keys) - values_of(self.design, self.keys)
         return np.outer(moved, moved)
 
     @property
@@ -106,7 +106,7 @@ class _Likeliest:
         if self.freed is not None:
             covariance = covariance + self.away(self.freed)
             fixed = {"inductance": kept_inductance(self.design, NOT_SHOWN)}
-        values = _values(self.design, self.keys)
+        values = values_of(self.design, self.keys)
         return Fit(names=self.keys, values=values, covariance=covariance, fixed=fixed)
 
 
@@ -176,8 +176,8 @@ class _Search:
             return weighed(_drives(runs))
 
         for turn in range(rounds):
-            moved = fit_output(design, keys, made, weighed(wanted), begin=_values(start, keys))
-            start = with_values(design, dict(zip(keys, moved.values.tolist(), strict=True)), check=False)
+            moved = fit_output(design, keys, made, weighed(wanted), begin=values_of(start, keys))
+            start = moved.design
             slopes, rests = (np.split(each, np.cumsum(rows)[:-1]) for each in (moved.slopes, moved.rest))
             left = np.array([np.std(rest) for rest in rests])
             sizes = sizes * left
@@ -264,10 +264,6 @@ def _at_its_rows(
 def _halfway(one: Record, other: Record) -> Record:
     """A record with its rows in the middle between two places."""
     return replace(one, early_s=0.5 * (np.asarray(one.early_s) + np.asarray(other.early_s)))
-
-
-def _values(design: Design, keys: Sequence[str]) -> Floats:
-    return np.array([parameter_value(design, key) for key in keys])
 
 
 def _moved_steps(found: _Likeliest, k: int, turn: int) -> Sequence[Record] | None:

@@ -48,9 +48,10 @@ class OutputErrorResult(Fit):
 
 @dataclass(frozen=True, kw_only=True)
 class Moved:
-    """Values (SI) with which an output fits best, its slopes over them, shape (n, p), and what is left."""
+    """Values (SI) with which an output fits best, their design, its slopes (n, p) over them, what is left."""
 
     values: Floats
+    design: Design
     slopes: Floats
     rest: Floats
     first: Floats
@@ -82,7 +83,7 @@ def fit_output(
     Least squares by a dogleg in a box (scipy), from the design's own values or others; the derivative is by
     central differences of a share `STEP` of each value of the design.
     """
-    start = np.array([parameter_value(design, path) for path in paths])
+    start = values_of(design, paths)
     scale, ends = box_of(design, paths)
     count, most = 0, ITERATIONS * (2 * len(paths) + 1)
     box = 1.0 + (ends - start) / scale
@@ -90,10 +91,13 @@ def fit_output(
     def values_at(moved: Floats) -> Floats:
         return np.select(list(np.abs(moved - box) <= AT_END), list(ends), start + scale * (moved - 1.0))
 
+    def design_at(moved: Floats) -> Design:
+        values = dict(zip(paths, values_at(moved).tolist(), strict=True))
+        return with_values(design, values, check=False)
+
     def residual(moved: Floats) -> Floats:
         nonlocal count
-        values = dict(zip(paths, values_at(moved).tolist(), strict=True))
-        output = output_of(with_values(design, values, check=False))
+        output = output_of(design_at(moved))
         count += 1
         if progress is not None:
             progress(min(count, most), most)
@@ -113,12 +117,18 @@ def fit_output(
     values = values_at(found.x)
     return Moved(
         values=values,
+        design=design_at(found.x),
         slopes=found.jac / scale,
         rest=found.fun,
         first=first,
         iterations=int(found.njev),
         at_bound=tuple(path for path, one, at in zip(paths, values, ends.T, strict=True) if one in at),
     )
+
+
+def values_of(design: Design, paths: Sequence[str]) -> Floats:
+    """The values (SI) of some keys of a design."""
+    return np.array([parameter_value(design, path) for path in paths])
 
 
 def box_of(design: Design, paths: Sequence[str]) -> tuple[Floats, Floats]:
@@ -128,7 +138,7 @@ def box_of(design: Design, paths: Sequence[str]) -> tuple[Floats, Floats]:
     """
     fields = [field_of(path) for path in paths]
     low, high = np.array([(-np.inf, np.inf) if one is None else (one.low, one.high) for one in fields]).T
-    scale = np.array([_scale(design, path, parameter_value(design, path)) for path in paths])
+    scale = np.array([_scale(design, *each) for each in zip(paths, values_of(design, paths), strict=True)])
     coupled = np.array([path == "load.inertia" and design.coupling is not None for path in paths])
     return scale, np.array([np.where(coupled, np.maximum(low, LEAST_LOAD * scale), low), high])
 
@@ -189,7 +199,6 @@ def refine_records(
     if len(dead):
         raise NumericalError(f"the output does not depend on {paths[int(dead[0])]}; leave it out")
     norm, ends = float(np.linalg.norm(wanted)), np.cumsum([len(record) for record in records]).tolist()
-    values = dict(zip(paths, found.values.tolist(), strict=True))
     return OutputErrorResult(
         names=paths,
         values=found.values,
@@ -197,7 +206,7 @@ def refine_records(
         error_before=float(np.linalg.norm(found.first)) / norm,
         error_after=float(np.linalg.norm(found.rest)) / norm,
         iterations=found.iterations,
-        design=with_values(design, values, check=False),
+        design=found.design,
         at_bound=found.at_bound,
     )
 

@@ -25,7 +25,7 @@ from analyses.identification.joint_model import (
     friction_columns,
 )
 from analyses.identification.load_side import two_sides
-from analyses.identification.sampled_current import held_s, mean_current
+from analyses.identification.sampled_current import acts_later_s, mean_current
 from analyses.records.consistency import NO_CHANCE, place_of
 from analyses.records.differentiation import Motion, decimated
 from analyses.records.driven_motion import ratio_of
@@ -307,8 +307,7 @@ def _torque(design: Design, record: Record, motion: Motion, recipe: Recipe) -> t
     constant = motor.torque_constant_Nm_A or 0.0
     drive, driven_by, origin, back_emf = drive_of(design, record)
     if driven_by.startswith("voltage") and not is_benchmark(record):
-        late = design.controller.computing_delay_s + 0.5 * min(held_s(design), period_of(record))
-        drive = np.interp(record.time_s - late, record.time_s, drive)
+        drive = np.interp(record.time_s - acts_later_s(design, record), record.time_s, drive)
     if driven_by == "current":
         drive = constant * mean_current(design, record, record["current"], motion.acceleration)
     drive = recipe.other_side(drive, period_of(record))

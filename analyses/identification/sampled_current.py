@@ -6,7 +6,7 @@ import numpy as np
 
 from actuator_lti.design.model import Design
 from actuator_lti.types import Complexes, Floats
-from analyses.records.record import Record
+from analyses.records.record import Record, period_of
 
 TICK_TOLERANCE = 1e-3
 LARGEST_CHANGE = 0.2
@@ -55,7 +55,15 @@ class HeldVoltage:
 def held_s(design: Design) -> float:
     """What a voltage is held for: the period of the innermost stage."""
     control = design.controller
-    return control.period_s * getattr(control.current or control.velocity or control.position, "every", 1)
+    return float(control.period_of(control.stages[-1] if control.stages else "voltage"))
+
+
+def acts_later_s(design: Design, record: Record) -> float:
+    """By how much a voltage acts later than its row: the computing delay, and half a step of what is seen.
+
+    That is what it is held for, or a row where these are closer.
+    """
+    return design.controller.computing_delay_s + 0.5 * min(held_s(design), period_of(record))
 
 
 def held_voltage(design: Design, record: Record) -> HeldVoltage | None:

@@ -13,6 +13,7 @@ from actuator_lti.design import read_design_text, with_values
 from actuator_lti.design.model import Design
 from analyses.identification.asked import Settings
 from analyses.identification.bench import BenchResult, identify_bench
+from analyses.identification.electrical import fit_electrical
 from analyses.identification.own_bias import in_counts
 from analyses.records.consistency import check_record
 from analyses.records.record import Record
@@ -355,3 +356,33 @@ def test_a_motor_held_fast_tells_resistance_and_inductance(motion: str) -> None:
     record = record_of(time, "fast", **signals)
     refused(_identified, record, match=r"resistance = 0\.6 ohm .*inductance = 0\.000(3|299\d) H .*moves")
     refused(identify_bench, _design(), [record], match="fast: no motion beyond noise.*--electrical tells R")
+
+
+@pytest.mark.parametrize("henry", [HENRY, 10.0 * HENRY])
+@pytest.mark.parametrize(("every", "row"), [(5, 5), (20, 20), (20, 10), (20, 1)])
+def test_a_voltage_of_a_slow_speed_loop_is_no_inductance(every: int, row: int, henry: float) -> None:
+    """It is held for 20 ticks, and was taken for one: inductance +252 %, by 11 standard errors.
+
+    The winding is exact at a fortieth of a tick, but for the speed's change within it.
+    """
+    fine, late, most = TICK_S / 40, TICK_S / 2, every * TICK_S
+    time = fine * np.arange(int(4.0 / fine))
+    speed = sum(w * np.sin(2.0 * pi * f * time + f) for w, f in ((200, 0.7), (100, 2.3), (40, 6.1)))
+
+    def volts(time: np.ndarray) -> np.ndarray:
+        held = most * np.floor(np.maximum(time, 0.0) / most + 1e-6)
+        waves = ((6, 0.9), (4, 3.1), (1, 11.0), (2, 23.0))
+        return np.asarray(sum(u * np.sin(2.0 * pi * f * held + f) for u, f in waves))
+
+    fall = exp(-OHM / henry * fine)
+    driving = (volts(time - late) - BACK * speed) / OHM
+    current = lfilter([0.0, 1.0 - fall], [1.0, -fall], driving)
+    at = np.arange(800 * row, len(time), 40 * row)
+    noise = 1e-3 * np.random.default_rng(1).standard_normal(len(at))
+    seen = {"speed": speed[at], "current": current[at] + noise, "voltage": volts(time[at])}
+    slow = {"control.velocity.every": every, "control.position.every": every}
+    design = with_values(read_design_text(TEXT), slow)
+    design = replace(design, controller=replace(design.controller, current=None))
+    fit = fit_electrical(design, [record_of(time[at] - time[at[0]], **seen)])
+    assert errors_off(fit, {**MOTOR, "inductance": henry}) < 3.0
+    assert fit["resistance"] == pytest.approx(OHM, rel=3e-3)
