@@ -15,8 +15,9 @@ from analyses.correlation import driving
 from analyses.correlation.between_ticks import likeliest_s, signals_at
 from analyses.correlation.compare import SignalComparison, compare_signals
 from analyses.correlation.following import Followed, followed, following_finding
-from analyses.records.consistency import Finding, because, check_record
+from analyses.records.consistency import check_record
 from analyses.records.differentiation import filtered_motion, lowest_cutoff_hz
+from analyses.records.finding import Finding, because
 from analyses.records.inputs import InputUse, account, lacking
 from analyses.records.naming import KNOWN_UNITS, LOADS
 from analyses.records.record import Record, period_of, prepared

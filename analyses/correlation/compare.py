@@ -8,7 +8,7 @@ import numpy as np
 from actuator_lti.errors import InputError
 from actuator_lti.types import Floats
 from analyses.estimation.series import best_lag
-from analyses.records.consistency import SURE
+from analyses.records.finding import SURE
 from analyses.records.single_rows import NORMAL
 
 ORDERS = (1, 2, 4)  # of the differences in which noise shows

@@ -11,8 +11,8 @@ from actuator_lti.design.model import Design
 from actuator_lti.types import Floats
 from analyses.correlation.driving import Driven, command_of
 from analyses.estimation.least_squares import identifiable, solve
-from analyses.records.consistency import COSINE, OVER, RATE_TOLERANCE, SURE, Finding
-from analyses.records.driven_motion import ratio_of
+from analyses.records.compared import COSINE, ratio_of
+from analyses.records.finding import OVER, RATE_TOLERANCE, SURE, Finding
 from analyses.records.naming import KNOWN_UNITS
 from analyses.records.record import Record
 

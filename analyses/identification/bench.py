@@ -32,7 +32,8 @@ from analyses.identification.output_error import OutputErrorResult, Resimulated,
 from analyses.identification.residuals import ResidualTest, residual_tests
 from analyses.identification.rows import is_loaded, recipe_for, stands
 from analyses.identification.run_down import runs_down, switched_off
-from analyses.records.consistency import Finding, because, check_record
+from analyses.records.consistency import check_record
+from analyses.records.finding import Finding, because
 from analyses.records.inputs import InputUse, account
 from analyses.records.record import HELD, Record, prepared
 

@@ -18,8 +18,9 @@ from analyses.identification.richer import RicherLaws, compare_laws
 from analyses.identification.surface import NAMES, SurfaceFit, fit_surface
 from analyses.identification.verdict import Item, kept_items, residual_item, simulated_item, size_item
 from analyses.records.campaign_import import ImportedCampaign, ImportedRun, SetAside
-from analyses.records.consistency import SURE, Finding, check_record, wrong_of
+from analyses.records.consistency import check_record
 from analyses.records.factors import named_factor
+from analyses.records.finding import SURE, Finding, wrong_of
 from analyses.records.inputs import InputUse
 from analyses.records.steady_window import CRITERION, SteadyCriterion
 from nonlinear import commands, simulate

@@ -27,7 +27,8 @@ from analyses.identification.electrical import (
 )
 from analyses.identification.joint_model import JointModel
 from analyses.identification.rows import drive_of, rows_under
-from analyses.records.consistency import NO_CHANCE, SURE, one_phase
+from analyses.records.finding import NO_CHANCE, SURE
+from analyses.records.rate import one_phase
 from analyses.records.record import Record
 
 EXPLAINED = 0.01  # level above which a cause explains what is off

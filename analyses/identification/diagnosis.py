@@ -26,9 +26,12 @@ from analyses.identification.rows import (
     record_rows,
     rows_under,
 )
-from analyses.records.consistency import COSINE, SURE, Finding, clock_doubt, resistance_doubt
+from analyses.records.compared import COSINE
+from analyses.records.finding import SURE, Finding
 from analyses.records.naming import KNOWN_UNITS, RATES
+from analyses.records.rate import clock_doubt
 from analyses.records.record import Record, lasting
+from analyses.records.voltage import resistance_doubt
 
 Fitting = Callable[[Sequence[Record]], JointModel]
 LEAST_RUN = 3  # samples in a row at the largest or smallest value of all: a flat top

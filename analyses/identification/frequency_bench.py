@@ -21,7 +21,8 @@ from analyses.identification.sampled_current import held_voltage
 from analyses.identification.to_design import design_with_fit
 from analyses.identification.two_mass import Lines, TwoMass
 from analyses.identification.verdict import Identified, Item
-from analyses.records.consistency import Finding, check_record
+from analyses.records.consistency import check_record
+from analyses.records.finding import Finding
 from analyses.records.inputs import InputUse, account
 from analyses.records.record import Record, prepared
 

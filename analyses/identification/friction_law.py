@@ -19,7 +19,7 @@ from analyses.estimation.least_squares import (
 )
 from analyses.estimation.series import correlation_time
 from analyses.identification.joint_model import JointModel, LawChoice, RecordFit, linear_basis
-from analyses.records.consistency import NO_CHANCE
+from analyses.records.finding import NO_CHANCE
 
 MOST_BREAKS = 4
 GRID = 24

@@ -22,7 +22,7 @@ from analyses.identification.response_model import Seen, loop_model
 from analyses.identification.response_search import STEP
 from analyses.identification.to_design import design_with_fit, with_correlations
 from analyses.identification.verdict import Identified, Item, kept_items, simulated_item
-from analyses.records.consistency import NO_CHANCE, SURE
+from analyses.records.finding import NO_CHANCE, SURE
 from analyses.records.response import RecordedResponse, read_response
 from analyses.studies.sampling import correlation_of
 

@@ -9,7 +9,7 @@ from actuator_lti.design.model import Design
 from analyses.correlation.compare import white_noise
 from analyses.correlation.driving import command_of
 from analyses.identification.joint_model import JointModel, Recipe
-from analyses.records.consistency import place_of
+from analyses.records.compared import place_of
 from analyses.records.differentiation import decimated
 from analyses.records.naming import RATES
 from analyses.records.record import Record, period_of

@@ -31,8 +31,8 @@ from analyses.identification.joint_model import NAMES, FrictionForm, JointModel,
 from analyses.identification.motion_noise import with_noise_of_motion
 from analyses.identification.own_bias import holds_between, without_bias
 from analyses.identification.run_down import fit_run_downs, runs_down
-from analyses.records.consistency import resistance_doubt
 from analyses.records.record import HELD, SMOOTH, Record
+from analyses.records.voltage import resistance_doubt
 
 Both = tuple[Sequence[Record], Sequence[Record]]  # records as taken, and simulated
 ROUNDS = 4

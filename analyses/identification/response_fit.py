@@ -17,7 +17,7 @@ from analyses.estimation.fit import COVERAGE, Fit, Fixed
 from analyses.estimation.least_squares import RESOLVED, identifiable
 from analyses.identification.response_model import Seen
 from analyses.identification.response_search import Point, Search
-from analyses.records.consistency import SURE
+from analyses.records.finding import SURE
 
 UNKNOWN = "not determined, the design's value kept"
 STARTS: tuple[float, ...] = 1.0, 0.25, 4.0

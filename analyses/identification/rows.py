@@ -26,9 +26,9 @@ from analyses.identification.joint_model import (
 )
 from analyses.identification.load_side import two_sides
 from analyses.identification.sampled_current import acts_later_s, mean_current
-from analyses.records.consistency import NO_CHANCE, place_of
+from analyses.records.compared import place_of, ratio_of
 from analyses.records.differentiation import Motion, decimated
-from analyses.records.driven_motion import ratio_of
+from analyses.records.finding import NO_CHANCE
 from analyses.records.inputs import lacking
 from analyses.records.naming import LOADS, RATES
 from analyses.records.record import Record, lasting, period_of, prepared

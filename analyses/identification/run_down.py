@@ -29,7 +29,8 @@ from analyses.identification.rows import (
     stands,
     too_short,
 )
-from analyses.records.consistency import NO_CHANCE, SURE, place_of
+from analyses.records.compared import place_of
+from analyses.records.finding import NO_CHANCE, SURE
 from analyses.records.naming import RATES
 from analyses.records.record import Record, lasting, period_of
 

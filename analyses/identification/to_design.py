@@ -16,7 +16,7 @@ from actuator_lti.types import Floats
 from analyses.estimation.fit import Fit
 from analyses.estimation.parameters import default_value, parameter
 from analyses.identification.joint_model import JointModel
-from analyses.records.consistency import SURE
+from analyses.records.finding import SURE
 
 LEAST_CORRELATION = 0.005
 TRUNCATION_STD = 6.5  # standard deviations that a normal distribution is sampled to

@@ -19,16 +19,10 @@ from analyses.identification.design_values import DesignValue, cause
 from analyses.identification.friction_law import Bend
 from analyses.identification.joint_model import JointModel
 from analyses.identification.residuals import ResidualTest
-from analyses.records.consistency import (
-    COSINE,
-    NO_CHANCE,
-    RATE_TOLERANCE,
-    SURE,
-    Finding,
-    one_phase,
-    wrong_of,
-)
+from analyses.records.compared import COSINE
 from analyses.records.factors import with_factor
+from analyses.records.finding import NO_CHANCE, RATE_TOLERANCE, SURE, Finding, wrong_of
+from analyses.records.rate import one_phase
 from analyses.records.record import Record
 
 RESIDUAL_LIMIT = 0.20  # largest relative residual that is taken without being told to

@@ -9,7 +9,7 @@ import numpy as np
 from scipy.optimize import minimize_scalar
 
 from actuator_lti.types import Floats, Ints
-from analyses.records.consistency import NO_CHANCE, RATE_TOLERANCE
+from analyses.records.finding import NO_CHANCE, RATE_TOLERANCE
 
 FINER = 8  # lines of the spectrum for each that the record resolves
 ROUNDING = 1e-9  # of a row

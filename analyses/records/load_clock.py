@@ -11,7 +11,7 @@ from actuator_lti.errors import InputError
 from actuator_lti.types import Floats
 from analyses.estimation.series import correlation_time, minus_likelihood, slow_shares, without_noise
 from analyses.records.clocks import ClockJoin
-from analyses.records.consistency import NO_CHANCE, SURE
+from analyses.records.finding import NO_CHANCE, SURE
 from analyses.records.record import Record
 from analyses.records.steady_window import CRITERION, find_steady_window
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 from analyses.correlation.closed_loop import CorrelationResult
 from analyses.correlation.compare import SignalComparison
 from analyses.correlation.run import BESIDE, Correlation, SignalSummary, follows_model, worst_of
-from analyses.records.consistency import left_out_of
+from analyses.records.finding import left_out_of
 from analyses.records.naming import MEANINGS
 from reports import document as doc
 from reports.charts import style

@@ -7,7 +7,7 @@ from analyses.estimation.fit import Fit
 from analyses.estimation.parameters import parameter
 from analyses.identification.design_values import given_constant
 from analyses.identification.verdict import Identified, Item
-from analyses.records.consistency import Finding
+from analyses.records.finding import Finding
 from analyses.records.inputs import InputUse
 from reports import document as doc
 from reports.numbers import show

@@ -10,7 +10,7 @@ from analyses.identification.design_values import DesignValue, given_constant
 from analyses.identification.inverse import SIGNED
 from analyses.identification.joint_model import JointModel, LawChoice, RecordFit
 from analyses.identification.residuals import ResidualTest
-from analyses.records.consistency import left_out_of
+from analyses.records.finding import left_out_of
 from reports import document as doc
 from reports.charts import style
 from reports.numbers import capital, show
