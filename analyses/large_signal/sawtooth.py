@@ -11,13 +11,14 @@ from actuator_lti.errors import positive_number
 from analyses.large_signal.classify import FULL_TRIANGLE, RateLimited, rate_limited
 from analyses.large_signal.tones import Tone, tone
 from analyses.specification.capability import drive_figures
-from nonlinear import State, commands, simulate
+from nonlinear import State, Trajectory, commands, simulate
 
 OVERRUN = 3.0  # x = w A/R that is shown
 PERIODS_SHOWN = 2
 POINTS = 900
 FAST, REVERSAL_DEG = 50.0, 1.0  # Kv/w from which, reversal up to which the formulas hold to 1 % and 1 deg
 GAIN_TOLERANCE, LAG_TOLERANCE_DEG = 0.01, 1.0
+LONGEST_TICKS = 400_000  # of a sine that is not steady by then
 
 
 @dataclass(frozen=True)
@@ -31,7 +32,7 @@ class SawtoothRun:
     output_rate_rad_s: np.ndarray
     speed_command_rad_s: np.ndarray
     current_A: np.ndarray
-    # Of the output over the last whole period: fundamental over the command, its lag, largest deflection from
+    # Of the output over the last window of periods: fundamental over the command, lag, deflection from
     # the mean, everything but mean and fundamental over the fundamental, peak over rms
     gain: float
     lag_deg: float
@@ -39,6 +40,7 @@ class SawtoothRun:
     distortion: float
     crest: float
     formula: RateLimited  # what a pure rate limit would do
+    steady: bool  # the fundamental is within `GAIN_TOLERANCE` that of half as long
 
     @property
     def gain_error(self) -> float:
@@ -138,11 +140,16 @@ def _run(design: Design, amplitude: float, at: Tone, load_Nm: float, rate: float
     if formula.x >= FULL_TRIANGLE:
         lag_s = math.radians(formula.lag_deg) / at.omega_rad_s
         begin = State(motor_angle_rad=-N * rate * lag_s)
-    seconds = (2 + PERIODS_SHOWN) * period * design.controller.period_s
-    run = simulate(design, commands.sine(amplitude, at.frequency_hz), seconds, load_Nm, initial=begin)
-    last = slice(-period, None)
-    y = run.output_angle_rad[last] - run.output_angle_rad[last].mean()
-    phasor = 2j * np.mean(y * np.exp(-2j * np.pi * at.frequency_hz * run.time_s[last]))
+    command, windows = commands.sine(amplitude, at.frequency_hz), 2 + PERIODS_SHOWN
+    while True:
+        seconds = windows * at.ticks * design.controller.period_s
+        run = simulate(design, command, seconds, load_Nm, initial=begin)
+        output, phasors = _by_window(run, at, windows)
+        y, phasor = output[-1], phasors[-1]
+        steady = bool(abs(phasor - phasors[windows // 2 - 1]) <= GAIN_TOLERANCE * abs(phasor))
+        if steady or 2 * windows * at.ticks > LONGEST_TICKS:
+            break
+        windows *= 2
     fundamental, rms, peak = abs(phasor), float(np.sqrt(np.mean(y**2))), float(np.max(np.abs(y)))
     if rms == 0.0 or fundamental == 0.0:
         return None
@@ -155,4 +162,12 @@ def _run(design: Design, amplitude: float, at: Tone, load_Nm: float, rate: float
         gain=fundamental / amplitude, lag_deg=float(-np.degrees(np.angle(phasor)) % 360.0), peak_rad=peak,
         distortion=math.sqrt(max(rms**2 - fundamental**2 / 2.0, 0.0)) / (fundamental / math.sqrt(2.0)),
         crest=peak / rms, formula=formula,
+        steady=steady,
     )  # fmt: skip
+
+
+def _by_window(run: Trajectory, at: Tone, windows: int) -> tuple[np.ndarray, np.ndarray]:
+    """The output less its mean in each window of whole periods, and its fundamental there."""
+    time, angle = (x[-windows * at.ticks :].reshape(windows, -1) for x in (run.time_s, run.output_angle_rad))
+    output = angle - angle.mean(axis=1)[:, None]
+    return output, 2j * np.mean(output * np.exp(-1j * at.omega_rad_s * time), axis=1)

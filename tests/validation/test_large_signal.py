@@ -100,6 +100,21 @@ def test_the_baseline_reverses_too_slowly_for_the_lag() -> None:
     slow = sawtooth(with_values(AMBER, {"limits.acceleration": 2500.0}))
     assert slow.reversal_deg > 180.0
     assert "no sawtooth" in _sawtooth(slow, unit, "N m")["caption"]
+    assert "Not steady at a load of 0, 8 N m" in _sawtooth(slow, unit, "N m")["caption"]
+
+
+def test_the_figures_are_those_of_the_steady_motion_from_any_start() -> None:
+    """Begun on a flank, the fourth period of this drive lags by one more degree."""
+    joint, periods = replace(load_design("joint"), command=Command()), 20
+    result = sawtooth(joint)
+    ours, sine = result.runs[0], commands.sine(result.amplitude_rad, result.frequency_hz)
+    run = simulate(joint, sine, periods / result.frequency_hz, 0.0)
+    last = run.time_s >= (periods - 1) / result.frequency_hz - 1e-9
+    turn = np.exp(-2j * np.pi * result.frequency_hz * run.time_s[last])
+    fundamental = 2j * np.mean(run.output_angle_rad[last] * turn) / result.amplitude_rad
+    assert ours.steady
+    assert ours.gain == pytest.approx(abs(fundamental), rel=2e-3)
+    assert ours.lag_deg == pytest.approx(-np.degrees(np.angle(fundamental)), abs=0.3)
 
 
 @pytest.mark.parametrize(("name", "changed", "asked", "word"), [
