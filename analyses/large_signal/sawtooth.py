@@ -32,8 +32,8 @@ class SawtoothRun:
     output_rate_rad_s: np.ndarray
     speed_command_rad_s: np.ndarray
     current_A: np.ndarray
-    # Of the output over the last window of periods: fundamental over the command, lag, deflection from
-    # the mean, everything but mean and fundamental over the fundamental, peak over rms
+    # Of the output over the last window of periods: fundamental over the command, its lag, largest deflection
+    # from the mean, everything but mean and fundamental over the fundamental, peak over rms
     gain: float
     lag_deg: float
     peak_rad: float

@@ -225,7 +225,7 @@ def _sawtooth(sawtooth: Sawtooth, out: Unit, load: str) -> doc.Block:
         "arccos(π/2x)."
     )
     if moving := [f"{run.load_Nm:g}" for run in sawtooth.runs if not run.steady]:
-        caption += f" Not steady at a load of {', '.join(moving)} {load}: the values still change by 1 %."
+        caption += f" Not steady at a load of {', '.join(moving)} {load}: still changing by over 1 %."
     if sawtooth.droops:
         slowest = significant(scale * sawtooth.slowest_rad_s)
         caption += f" Not checked: under load the P velocity loop droops to {slowest} {rate.unit}."

@@ -14,6 +14,7 @@ from analyses.comparison.variants import compare
 from analyses.studies.study import load_study
 from reports.arithmetic import same_order
 from reports.certain import certain
+from tests.machines.machine_kinds import kernels
 from tests.reports.test_cli import PLOTTING
 
 DOCUMENT = """
@@ -44,10 +45,9 @@ def ran(*words: str, kept: tuple[str, ...] = tuple(os.environ), **environment: s
 
 @pytest.mark.skipif(platform.machine() != "x86_64", reason="names of kernels of one family of processors")
 def test_the_document_does_not_depend_on_kernel_and_threads() -> None:
-    ways = [("Haswell", "1"), ("SkylakeX", "2"), ("Nehalem", "1")]
     made = [
         ran("-c", DOCUMENT, SOURCE_DATE_EPOCH="0", OPENBLAS_CORETYPE=core, OPENBLAS_NUM_THREADS=threads)
-        for core, threads in ways
+        for core, threads in zip(kernels(), "121", strict=True)
     ]
     assert len(made[0]) > 100_000
     assert made[0] == made[1] == made[2]
