@@ -65,7 +65,8 @@ MACHINE_TESTS := tests/margins/test_margin_reference_loops.py tests/margins/test
   tests/margins/test_delay_margins.py tests/margins/test_step_random.py \
   tests/margins/test_bandwidth.py tests/loops/test_loops_forms.py tests/loops/test_loops_published.py \
   tests/loops/test_rest_mode.py tests/study/test_compiled_figures.py \
-  tests/validation/test_limit_cycles.py tests/reports/test_certified_report.py tests/identification/test_response_fit.py
+  tests/validation/test_limit_cycles.py tests/reports/test_certified_report.py tests/identification/test_response_fit.py \
+  tests/export/test_wasm_loops.py
 AS_MACHINE := $(BIN)/python -m pytest -q -p no:cacheprovider -m "not slow" $(MACHINE_TESTS)
 
 # Two machines at once.

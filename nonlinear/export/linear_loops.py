@@ -12,6 +12,7 @@ import math
 
 from actuator_lti.batch._complex import copied
 from actuator_lti.batch._eigen import eigenvalues
+from actuator_lti.batch._linalg import balance
 from actuator_lti.batch._resolvent import states_at
 from actuator_lti.batch._response import evaluate
 from actuator_lti.batch._run import one_loop
@@ -204,10 +205,16 @@ def limiters_assembled(p, q, s, io, blocks, places, keep, seen, a, b, c):
         blocks[n * n + n + i] = total
     kept = spread(n, 1, blocks, keep)
     joined(n, 1, kept, blocks, keep, a, b, c)
+    for i in range(kept):
+        c[i] = (
+            1.0  # becomes what a state is multiplied by: rows of 1e9 beside 1e-9 cost elimination its digits
+        )
+    balance(kept, a, b, c)
     for k in range(every * linear.SEEN):
         for i in range(n):
             if keep[i] >= 0.0:
-                seen[k * (linear.MOST + 1) + int(keep[i])] = seen[k * (linear.MOST + 1) + i]
+                at = int(keep[i])
+                seen[k * (linear.MOST + 1) + at] = c[at] * seen[k * (linear.MOST + 1) + i]
     return kept
 
 

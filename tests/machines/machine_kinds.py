@@ -2,7 +2,8 @@
 
 A kernel for instructions that the processor does not have would end the process: it is left out.
 ``python machine_kinds.py SEED ...`` prints a machine for each seed, of a processor that is not at hand
-(`beside`): its products are those of one of the kernels that run here, but for the one of all tests, in turn.
+(`beside`): its products are those of one of the kernels that run here, but for the one of all tests, in turn,
+and numpy's functions those of a processor of that kernel.
 """
 
 import os
@@ -38,10 +39,25 @@ def kinds() -> dict[str, dict[str, str]]:
     return result
 
 
+def _without(kernel: str) -> str:
+    """The variable that keeps numpy from instructions that a processor of a kernel does not have."""
+    needs = _KERNELS[kernel]
+    newer = {
+        "X86_V3": "AVX2" not in needs,
+        "X86_V4": "AVX512F" not in needs,
+        "AVX512": "AVX512F" not in needs,
+    }
+    here = [name for name in __cpu_dispatch__ if __cpu_features__.get(name)]
+    off = [name for name in here if any(name.startswith(level) and newer[level] for level in newer)]
+    return f"NPY_DISABLE_CPU_FEATURES={','.join(off)} " if off else ""
+
+
 def machines(seeds: list[str]) -> list[str]:
     """A line of environment variables for each machine; every kernel once where the seeds are fewer."""
     of_all_tests = {**same_order(), **os.environ}.get("OPENBLAS_CORETYPE")
-    others = [f"OPENBLAS_CORETYPE={name} " for name in kernels() if name != of_all_tests] or [""]
+    others = [f"OPENBLAS_CORETYPE={name} {_without(name)}" for name in kernels() if name != of_all_tests] or [
+        ""
+    ]
     seeds += [""] * (len(others) - len(seeds))
     return [f"{kernel}OTHER_PROCESSOR={seed}" for kernel, seed in zip(cycle(others), seeds, strict=False)]
 
