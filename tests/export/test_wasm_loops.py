@@ -36,9 +36,9 @@ STAGES = {
 }  # fmt: skip
 ANGLES = np.geomspace(1e-2, 3.1, 40)  # rad per sample; below, z I - A of the linear form loses digits
 # Of the random drives. Three are 1e-9 beyond what a nudge of the design's values moves: the rounding of the
-# matrices moves them, whose poles lie 1e-8 from one (3, 61), or whose peak is 700 times its final value, which
-# an ulp of one entry moves by 2e-10 (75). 32: more states than figures of many designs take. 57: an inner loop
-# that grows by 4e10 a sample.
+# matrices moves them, whose poles lie 1e-8 from one (3, 61), or whose peak is 700 times its final value,
+# which an ulp of one entry moves by 2e-10 (75). 32: more states than figures of many designs take. 57: an
+# inner loop that grows by 4e10 a sample.
 MISSED = (3, 32, 57, 61, 75)
 FURTHEST_DB = 200.0  # a crossing further off than this is where rounding makes the phase
 
