@@ -55,7 +55,7 @@ CRITERIA = (
     f"triangle: third harmonic, in phase as in a triangle, above {100 * TRIANGLE_SHARE:.0f} % of 1/9; "
     f"parabola: the same within {100 * PARABOLA_SHARE:.0f} % of 1/27, with the other sign "
     f"(both only where a limit acts); sine: distortion below {100 * SINE_DISTORTION:.0f} %; else distorted. "
-    f"Not steady: fundamental still changing by more than {100 * STEADY:.0f} % from one window to the next."
+    f"Not steady: fundamental more than {100 * STEADY:.0f} % off that of half as long."
 )
 CAUSE_RULE = (
     "The limit named is the one that acts at most ticks of the last window. Where none acts: stiction if "
@@ -66,8 +66,11 @@ CAUSE_RULE = (
 )
 
 
-def waveforms(result: BatchResult) -> np.ndarray:
-    """Classify the output of each run in the last window (`CRITERIA`); index into `WAVEFORMS`."""
+def waveforms(result: BatchResult, change: np.ndarray) -> np.ndarray:
+    """Classify the output of each run in the last window (`CRITERIA`); index into `WAVEFORMS`.
+
+    ``change``, shape (runs,): relative one of the fundamental since the run was half as long.
+    """
     first = result.phasor("output_angle_rad", 1)
     third = result.phasor("output_angle_rad", 3)
     size = np.maximum(np.abs(first), 1e-300)
@@ -76,7 +79,7 @@ def waveforms(result: BatchResult) -> np.ndarray:
     limited = limiter_fractions(result).max(axis=1) > 0.0
     conditions = [
         (stick >= 1.0, "no motion"),
-        (result.unsteadiness("output_angle_rad") > STEADY, "not steady"),
+        (change > STEADY, "not steady"),
         (stick >= STICK_FRACTION, "stick-slip"),
         (limited & (in_phase < TRIANGLE_SHARE * TRIANGLE_THIRD), "triangle"),
         (limited & (np.abs(in_phase / PARABOLA_THIRD - 1.0) < PARABOLA_SHARE), "parabola"),

@@ -21,7 +21,7 @@ from analyses.finite import finite
 from analyses.friction_effects.breakaway import static_threshold
 from analyses.large_signal import tones
 from analyses.large_signal.classify import CAUSES, WAVEFORMS, causes, limiter_fractions, not_linear, waveforms
-from analyses.large_signal.tones import MOST_TICKS, linear_steady_state, run_tones
+from analyses.large_signal.tones import MOST_TICKS, linear_steady_state, run_until_steady, tone_rows
 from analyses.linear.loop_survey import with_cogging
 
 if TYPE_CHECKING:
@@ -45,7 +45,7 @@ class AmplitudeMap(Compared):
     limiter_fraction: np.ndarray  # shape (a, f, limiters): of the last window in which each acts
     stick_fraction: np.ndarray  # shape (a, f), as what follows: of the output in the last window
     distortion: np.ndarray
-    unsteadiness: np.ndarray
+    unsteadiness: np.ndarray  # change of the fundamental since half as long, relative
     response: np.ndarray  # shape (a, f): fundamental of the output over the command
     linear: np.ndarray  # shape (f,): the same from the linear sampled loop, sliding
     onset_rad: Mapping[str, np.ndarray]  # A_k(w) of each limiter, linear, no load; no `slow_protection`
@@ -116,26 +116,26 @@ def amplitude_map(
     which = np.tile(np.arange(len(omega)), len(levels))
     amplitude, linear = np.repeat(levels, len(omega)), start.output[which]
     begin = np.minimum(amplitude, BELOW_ONSET * linear_limit.amplitude_rad[which])
-    result = run_tones(
-        design, frequencies, which, amplitude, start, begin,
-        load_Nm=load_Nm, friction_on=friction_on, insist=True,
-    )  # fmt: skip
+    rows = tone_rows(
+        design, frequencies, which, amplitude, start, begin, load_Nm=load_Nm, friction_on=friction_on
+    )
+    result, change = run_until_steady(rows)
     cause = causes(result, linear, amplitude, friction_on)
     off = np.flatnonzero(cause == CAUSES.index("friction"))
     if len(off):  # the same runs without dry friction: is it that?
-        free = run_tones(
+        free = tone_rows(
             design, frequencies, which[off], amplitude[off], start, begin[off],
             load_Nm=load_Nm, friction_on=False,
         )  # fmt: skip
-        cause[off[not_linear(free, linear[off], amplitude[off])]] = CAUSES.index("other")
+        cause[off[not_linear(free.run(), linear[off], amplitude[off])]] = CAUSES.index("other")
     shape = (len(levels), len(omega))
     return AmplitudeMap(
         load_Nm=load_Nm, amplitude_rad=levels, frequency_hz=omega / (2.0 * np.pi), cause=cause.reshape(shape),
-        waveform=waveforms(result).reshape(shape),
+        waveform=waveforms(result, change).reshape(shape),
         limiter_fraction=limiter_fractions(result).reshape((*shape, -1)),
         stick_fraction=result.window_stick_fraction.reshape(shape),
         distortion=result.distortion("output_angle_rad").reshape(shape),
-        unsteadiness=result.unsteadiness("output_angle_rad").reshape(shape),
+        unsteadiness=change.reshape(shape),
         response=(result.phasor("output_angle_rad") / amplitude).reshape(shape), linear=start.output,
         onset_rad={name: a for name, a in linear_limit.each_rad.items() if name not in slow},
         ticks=int(result.column("ticks").sum()), coarser=counts != given,

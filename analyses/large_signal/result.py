@@ -18,7 +18,7 @@ from actuator_lti.loops.limiters import onset
 from analyses.large_signal.classify import limiter_fractions
 from analyses.large_signal.map import COUNTS, AmplitudeBode, AmplitudeMap, amplitude_bode, amplitude_map
 from analyses.large_signal.sawtooth import Sawtooth, sawtooth
-from analyses.large_signal.tones import MOST_TICKS, linear_steady_state, run_tones, tones, work_ticks
+from analyses.large_signal.tones import MOST_TICKS, linear_steady_state, tone_rows, tones, work_ticks
 from analyses.linear.responses import response_at
 from nonlinear import LIMITERS
 
@@ -71,7 +71,9 @@ def limit_shift(design: Design, loops: Loops, count: int = COUNT) -> LimitShift 
 
     def acting(amplitude: np.ndarray) -> np.ndarray:
         begin = np.minimum(amplitude, 0.99 * linear)
-        return limiter_fractions(run_tones(design, chosen, limited, amplitude, start, begin, harmonics=1))
+        return limiter_fractions(
+            tone_rows(design, chosen, limited, amplitude, start, begin, harmonics=1).run()
+        )
 
     simulated, names = np.full(len(omega), np.nan), np.full(len(omega), "", dtype=object)
     simulated[limited], names[limited] = _bisect(acting, linear, [linear_limit.active[k] for k in limited])

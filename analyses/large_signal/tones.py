@@ -200,19 +200,19 @@ def amplitudes(design: Design, count: int, smallest_rad: float | None) -> np.nda
 
 HARMONICS = 3
 BEYOND = 1.1  # of the amplitude of the linear start: only what is limited can end in a triangle
-LONGER, MORE_WINDOWS, MORE_TICKS = 4, 12, 24_000
+DOUBLINGS = 4  # of a run that is not steady: at most so many times twice as long
+ROUNDING = 1e-10  # of an output that stands: less is the rounding of its fundamental
 TANH_TOLERANCE = 1e-5  # of the smoothing speed, a tick: far below what a fundamental is looked at for
 
 
-def run_tones(
+def tone_rows(
     design: Design, tones: tuple[Tone, ...], which: np.ndarray, amplitude_rad: np.ndarray,
     start: LinearSteadyState, start_amplitude_rad: np.ndarray, *, load_Nm: float = 0.0,
-    friction_on: bool = True, harmonics: int = HARMONICS, insist: bool = False,
-) -> BatchResult:  # fmt: skip
-    """Simulate one sine a run, tone ``which[r]``, from the linear steady state at ``start_amplitude_rad``.
+    friction_on: bool = True, harmonics: int = HARMONICS,
+) -> Rows:  # fmt: skip
+    """One sine a run, tone ``which[r]``, from the linear steady state at ``start_amplitude_rad``.
 
-    That is at most the onset of limiting; both amplitudes are the command's, at the output shaft.  ``insist``
-    goes on with what has not settled, for four times the start-up and several periods more.
+    That is at most the onset of limiting; both amplitudes are the command's, at the output shaft.
     """
     rows = Rows.of(design, len(which), friction_on=friction_on)
     hertz, windows, cycles = np.array([(t.frequency_hz, t.ticks, t.cycles) for t in tones])[which].T
@@ -223,18 +223,29 @@ def run_tones(
     triangle_start(design, rows, amplitude_rad, amplitude_rad > BEYOND * start_amplitude_rad)
     rows["load"], rows["tanh_tolerance"] = load_Nm, TANH_TOLERANCE
     rows["ticks"] = start.settling_ticks + 2 * windows
-    if not insist:
-        return rows.run()
+    return rows
+
+
+def run_until_steady(rows: Rows) -> tuple[BatchResult, np.ndarray]:
+    """Run each until the fundamental of its output is that of half as long; and its last relative change.
+
+    What changes by more than `STEADY` after `DOUBLINGS` is not steady; what stands is.
+    """
     drives = [rows.running(k) for k in range(len(rows))]
     result = rows.run(drives=drives)
-    moving = result.window_stick_fraction < 1.0
-    late = np.flatnonzero(result.ok & moving & (result.unsteadiness("output_angle_rad") > STEADY))
-    if not len(late):
-        return result
-    longer = rows.take(late)
-    more = np.ceil(np.minimum(MORE_WINDOWS * longer["window"], MORE_TICKS))
-    longer["ticks"] += LONGER * start.settling_ticks + more
-    return result.with_part(late, longer.run(drives=[drives[int(k)] for k in late]))
+    change = np.zeros(len(rows))
+    late = np.flatnonzero(result.ok & (result.window_stick_fraction < 1.0))
+    for _ in range(DOUBLINGS):
+        if not len(late):
+            break
+        longer, before = rows.take(late), result.phasor("output_angle_rad")[late]
+        longer["ticks"] = 2 * result.column("ticks")[late]
+        result = result.with_part(late, longer.run(drives=[drives[int(k)] for k in late]))
+        after = result.phasor("output_angle_rad")[late]
+        still = ROUNDING * result.rms("output_angle_rad")[late]
+        change[late] = np.abs(after - before) / np.maximum(np.abs(after), np.maximum(still, 1e-300))
+        late = late[change[late] > STEADY]
+    return result, change
 
 
 FAINT = 1e-6  # of what begins at rest is left, unless said otherwise

@@ -15,7 +15,7 @@ from actuator_lti.loops import assemble_loops
 from analyses.corners import corners, worst_of
 from analyses.duty import duty
 from analyses.failures import failures
-from analyses.large_signal.tones import linear_steady_state, run_tones, tone
+from analyses.large_signal.tones import linear_steady_state, run_until_steady, tone, tone_rows
 from analyses.limit_cycles import limit_cycles
 from analyses.motion.settling import ending_of
 
@@ -38,7 +38,7 @@ def said_of(design: Design, frequency_hz: float | None) -> str:
     chosen = tone(frequency_hz, design)
     start = linear_steady_state(assemble_loops(design), np.array([chosen.omega_rad_s]))
     amplitude, nothing = np.array([full]), np.zeros(1)
-    run = run_tones(design, (chosen,), np.zeros(1, dtype=int), amplitude, start, nothing, insist=True)
+    run, _ = run_until_steady(tone_rows(design, (chosen,), np.zeros(1, int), amplitude, start, nothing))
     gain = float(abs(run.phasor("output_angle_rad")[0])) / full
     share = float(run.window_limit_fraction("profile")[0])
     said = f"{said}; simulated at {scale * full:.3g} {unit} and {chosen.frequency_hz:.3g} Hz: "
