@@ -31,11 +31,11 @@ A study file is TOML and only data::
     loop = "position"
     minimum = "20 Hz"
 
-    [monte_carlo]
+    [monte_carlo]                            # read by the nightly alone: samples of every design
     samples = 1000
     seed = 0
 
-    [nightly]                                # read by the nightly alone: a PDF beside each report
+    [nightly]                                # and a PDF beside each report
     pdf = true
 """
 

@@ -38,13 +38,13 @@ def section(result: Failures) -> doc.Section:
     intro = (
         f"Each failure is simulated from a drive that {held} under {load} (positive pushes forward). "
         f"Deflection counts from where the output was; {stop}, and "
-        f"detection takes {1e3 * asked.detection_s:.4g} ms. The {push} is that in the coupling"
+        f"detection takes {1e3 * asked.detection_s:.4g} ms. The {push} is "
     )
     rigid = (
-        ": of this rigid train what it passes to the output, to its inertia and load or, jammed, what "
+        "what this rigid train passes to the output, to its inertia and load or, jammed, what "
         "the motor presses with, less dry friction and gear losses, without an impact"
     )
-    intro += rigid * (result.design.coupling is None) + "."
+    intro += f"{rigid if result.design.coupling is None else 'that in the coupling'}."
     left = [f"{NAMES[name]}: not for this drive, as {why}." for name, why in result.left_out.items()]
     own = requirements.table(result.requirements)
     blocks = [_table(result, out), *own, _figure(result, out), *map(doc.text, left)]
