@@ -15,6 +15,7 @@ from importlib import metadata
 from math import isnan, pi
 from pathlib import Path
 
+import numpy as np
 from pydantic import TypeAdapter
 
 from actuator_lti.asked.drive_figure import drive_figure
@@ -27,6 +28,7 @@ from actuator_lti.files.atomic import write_bytes
 from actuator_lti.files.reading import decode, read_bytes
 from actuator_lti.loops import Loops
 from actuator_lti.loops.limiters import onset
+from analyses.large_signal.tones import full_command
 from analyses.linear.loop_figures import LoopFigures
 from analyses.linear.loop_survey import with_cogging
 from analyses.monte_carlo.task import StepCheck, step_columns
@@ -69,21 +71,29 @@ class LargeSignal:
     """Large-signal figures, taken of every design at the same commands."""
 
     frequencies_hz: tuple[float, ...]  # where the largest linear amplitude is given
-    deflection_rad: float  # of the step
+    step: float  # of the command: the full deflection (output side), half of the top speed or peak current
     duration_s: float
     loads_Nm: tuple[float, ...]
+    command: tuple[str, str]  # axis and stage that take it
 
     @classmethod
     def plan(cls, base: Design) -> LargeSignal:
-        """Choose commands from the base, so that all designs get the same."""
-        rates = [drive_figures(base, load).output_rate_rad_s for load in base.validation.loads_Nm]
-        slowest = min((rate for rate in rates if rate > 0.0), default=1.0)
-        deflection = base.validation.full_deflection_rad
-        duration = min(20.0, 0.5 + 2.0 * deflection / slowest)
-        return cls((1.0, 5.0), deflection, duration, base.validation.loads_Nm)
+        """Choose commands from the base, so that all designs that take such get the same."""
+        outer, full = base.controller.outermost, full_command(base)
+        step = full if outer == "position" else 0.5 * full
+        figures = [drive_figures(base, load) for load in base.validation.loads_Nm]
+        paces = {
+            "position": [each.output_rate_rad_s for each in figures],
+            "velocity": [each.acceleration_rad_s2 for each in figures],
+        }.get(outer, [])
+        slowest = min((pace for pace in paces if pace > 0.0), default=np.inf)
+        duration = min(20.0, 0.5 + 2.0 * step / slowest)
+        return cls((1.0, 5.0), step, duration, base.validation.loads_Nm, _command(base))
 
     def figures(self, design: Design, loops: Loops) -> dict[str, float | None]:
-        """Largest linear amplitudes, and the nonlinear step of full deflection at every load."""
+        """Largest linear amplitudes, and the nonlinear step at every load; of another command its own."""
+        if _command(design) != self.command:
+            return LargeSignal.plan(design).figures(design, loops)
         shown = COMMAND_UNITS[design.axis, design.controller.outermost][1]
         figures: dict[str, float | None] = {}
         for frequency in self.frequencies_hz:
@@ -93,7 +103,7 @@ class LargeSignal:
                 continue  # beyond Nyquist of the position loop
             figures[f"large.onset@{frequency:g}"] = float(linear_limit.amplitude_rad[0]) * shown
         for load in self.loads_Nm:
-            step = StepCheck(self.deflection_rad, self.duration_s, load)
+            step = StepCheck(self.step, self.duration_s, load)
             columns = step_columns(step, Population(design, {}, 1))
             for name in ("rise_time", "overshoot", "settling_time", "peak_current"):
                 value = float(columns[f"nonlinear.{name}"][0])
@@ -101,11 +111,15 @@ class LargeSignal:
         return figures
 
 
+def _command(design: Design) -> tuple[str, str]:
+    return design.axis, design.controller.outermost
+
+
 def apart(key: str, base: Design, design: Design) -> str:
     """What sets a figure apart from the base's: another axis (" linear"), with its units, or command."""
     group, _, rest = key.partition(".")
     quantity, _, load = rest.partition("@")
-    own, its = ((one.axis, one.controller.outermost) for one in (design, base))
+    own, its = _command(design), _command(base)
     if group == "large" and own != its:
         return " ".join(("", *own))
     if group != "drive" or own[0] == its[0]:

@@ -54,7 +54,7 @@ class GainSetting:
 
 @dataclass(frozen=True)
 class TradeOffPoint:
-    """Largest phase margin that every loop keeps at its worst corner, at a position bandwidth."""
+    """Largest phase margin that every loop keeps at its worst corner, at a bandwidth of the outermost."""
 
     bandwidth_hz: float
     phase_margin_deg: float
@@ -66,7 +66,7 @@ class NonlinearCheck:
     """A step of the tuned design in the nonlinear model, with every limit and friction."""
 
     corner: str
-    amplitude_rad: float
+    amplitude_rad: float  # linear axis: m; rad/s of a speed drive, A of a current drive
     rise_time_s: float | None
     overshoot_percent: float
     settling_time_s: float | None  # None where it does not stay within 2 % of the commanded angle
@@ -147,12 +147,12 @@ def hunting(tuned: Design) -> str:
 def nonlinear_checks(
     tuned: Design, problem: Problem, gains: Floats, result: Floats
 ) -> Iterator[NonlinearCheck]:
-    """Steps of a twentieth and of all of full deflection (a second), every limit and friction on."""
+    """Steps of a twentieth and of all of full deflection (see `LargeSignal`), every limit and friction on."""
     worst, plan = int(np.argmin(result.min(axis=1))), LargeSignal.plan(tuned)
     names = ["nominal", "worst corner"][: 2 if worst else 1]
     points = problem.all_corners[[0, worst][: len(names)]]
     population = Population(tuned, problem.values_at(gains[None, :], points, problem.factors), len(names))
-    for size in (0.05 * plan.deflection_rad, plan.deflection_rad):
+    for size in (0.05 * plan.step, plan.step):
         columns = step_columns(StepCheck(size, plan.duration_s), population)
         for k, corner in enumerate(names):
             seen = {name.partition(".")[2]: float(column[k]) for name, column in columns.items()}

@@ -170,10 +170,14 @@ _MET = -1e-3
 
 
 def trade_off(problem: Problem, gains: Floats, working: Floats) -> tuple[TradeOffPoint, ...]:
-    """Largest smallest phase margin (all loops, ``working`` corners) at bandwidths about the tuned one."""
+    """Largest smallest phase margin (all loops, ``working`` corners) at bandwidths about the tuned one.
+
+    Of the outermost loop.
+    """
+    outer = problem.design.controller.outermost
     others = [
         k for k, r in enumerate(problem.requirements)
-        if r.quantity != "phase_margin" and not (r.quantity == "bandwidth" and r.loop in ("position", None))
+        if r.quantity != "phase_margin" and not (r.quantity == "bandwidth" and r.loop in (outer, None))
     ]  # fmt: skip
     trade = _TradeOff(problem, working, others)
     centre = float(np.min(trade.width(gains[None, :])))
@@ -200,7 +204,7 @@ class _TradeOff:
     others: list[int]
 
     def width(self, rows: Floats) -> Floats:
-        return self.problem.figure("bandwidth", "position", rows, self.working)
+        return self.problem.figure("bandwidth", self.problem.design.controller.outermost, rows, self.working)
 
     def margins(self, rows: Floats) -> Floats:
         """Phase margins, shape (candidates, loops * corners); 180 without crossing."""

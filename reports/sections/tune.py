@@ -120,10 +120,11 @@ def gains(result: TuningResult) -> doc.Block:
 def _curve(result: TuningResult) -> doc.Block:
     limits = {(r.id, r.unit) for r in result.requirements}
     wanted = [q for q in result.before.requirements if (q.id, q.unit) in limits]
-    width = [q.minimum for q in wanted if q.quantity == "bandwidth" and q.loop == "position"]
+    outer = result.design.controller.outermost
+    width = [q.minimum for q in wanted if q.quantity == "bandwidth" and q.loop == outer]
     margin = style.known(q.minimum for q in wanted if q.quantity == "phase_margin")
-    chart = style.Chart(width=style.WIDE, height=350.0, title="What the position loop can trade")
-    panel = chart.panel("bandwidth of the position loop, Hz", "smallest phase margin of all loops, deg")
+    chart = style.Chart(width=style.WIDE, height=350.0, title=f"What the {outer} loop can trade")
+    panel = chart.panel(f"bandwidth of the {outer} loop, Hz", "smallest phase margin of all loops, deg")
     x, y = [p.bandwidth_hz for p in result.trade_off], [p.phase_margin_deg for p in result.trade_off]
     panel.curve(x, y, "best smallest phase margin, worst corner", colour=style.BLUE)
     for ok, marker, colour, legend in (
@@ -138,7 +139,9 @@ def _curve(result: TuningResult) -> doc.Block:
         panel.rule_x(width[0], **required)
     if margin:
         panel.rule_y(max(margin), **required)
-    caption = "Position bandwidth against the phase margin that every loop keeps at its worst corner."
+    caption = (
+        f"{outer.capitalize()} bandwidth against the phase margin that every loop keeps at its worst corner."
+    )
     return doc.figure("trade_off", chart, caption)
 
 

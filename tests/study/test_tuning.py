@@ -163,10 +163,22 @@ def test_the_step_of_a_speed_drive_is_judged_by_its_speed():
 
 
 def test_the_time_in_a_limit_is_that_of_the_ticks_that_ask_for_more():
-    """At the limit U the speed rises by U T/J a tick; K (r - k U T/J) > U up to k = 700/3 where r = 1."""
+    """At the limit U the speed rises by U T/J a tick; K (r - k U T/J) > U up to k = 200/3 where r = 0.5."""
     design = source_drive(0.1, 1.0, PERIOD, 0.3, controller={"velocity": VelocityLoop(gain=1.0)})
     asked = replace(design, requirements=(need("phase_margin", 1.0),))
-    assert [one.limited for one in tune(asked, TuningSettings(curve=False)).checks] == ["", "voltage 234 ms"]
+    assert [one.limited for one in tune(asked, TuningSettings(curve=False)).checks] == ["", "voltage 67 ms"]
+
+
+def test_a_speed_drive_trades_its_own_bandwidth_and_steps_to_half_its_top_speed():
+    design = load_design("ilr33-amber")
+    design = replace(design, controller=replace(design.controller, position=None), requirements=())
+    tuned = tune(design, TuningSettings((need("phase_margin", 50.0, loop="velocity"),)))
+    widths = [point.bandwidth_hz for point in tuned.trade_off]
+    reached = closed_loop_bandwidth(assemble_loops(tuned.design).velocity.closed_loop).minus3db_hz
+    assert min(widths) < reached < max(widths)
+    top = design.limits.speed_rad_s / design.total_ratio
+    assert [one.amplitude_rad for one in tuned.checks[::2]] == pytest.approx([0.025 * top, 0.5 * top])
+    assert all(one.settling_time_s is not None for one in tuned.checks)
 
 
 def test_an_unstable_drive_whose_outer_poles_are_not_known_is_far_from_every_limit():

@@ -227,7 +227,10 @@ def test_an_amplitude_is_in_the_unit_of_the_command(changes, unit, per_si):
     if "position" not in changes:
         design = replace(design, controller=replace(design.controller, position=None), **changes)
     loops = assemble_loops(design)
-    found = LargeSignal((5.0,), 0.1, 0.1, ()).figures(design, loops)
+    own = LargeSignal.plan(design)
+    found = replace(own, frequencies_hz=(5.0,), loads_Nm=()).figures(design, loops)
+    of_a_current_drive = replace(own, command=("rotary", "current"), step=1e-9)
+    assert of_a_current_drive.figures(design, loops) == own.figures(design, loops)
     assert found["large.onset@5"] == pytest.approx(per_si * onset(loops, [10.0 * math.pi]).amplitude_rad[0])
     (name,) = figure_names([(found, design)])
     assert name.unit == unit
