@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, get_args, get_origin,
 if TYPE_CHECKING:
     from analyses.studies.engine import Engine
 
-Kind = Literal["plain", "output", "speed", "load", "slope", "command", "rate"]
+Kind = Literal["plain", "output", "speed", "load", "slope", "step", "command", "rate"]
 UNITS = ("_rad_s", "_rad", "_hz", "_Nm", "_s", "_degC", "_V", "_A")
 
 
@@ -27,8 +27,8 @@ class Option:
     _: KW_ONLY
     flag: str = ""  # the option, without dashes; the field's name without its unit where empty
     # ``"output"``, ``"speed"``: of the output with its unit; ``"load"``, ``"slope"``: a load, or one over the
-    # output's angle, with or without; ``"command"``, ``"rate"``: of the command of the outermost loop, or of
-    # its rate, with or without
+    # output's angle, with or without; ``"step"``: of the command of the outermost loop, in SI, A and V with
+    # or without; ``"command"``, ``"rate"``: the same or its rate in the usual unit, with or without
     kind: Kind = "plain"
     ramps: bool = False  # whether --command ramp makes a rate of it
     # Whether it stands by its place, without a flag; it has to be given where it has no default

@@ -31,7 +31,12 @@ class Asked(OnMachines):
         None
     )
     step: Annotated[
-        float | None, Option('Nonlinear step of every sample, such as "1 deg".', "ANGLE", kind="output")
+        float | None,
+        Option(
+            'Nonlinear step of every sample, such as "1 deg"; "20 deg/s" of a speed drive, "2 A", "5 V".',
+            "STEP",
+            kind="step",
+        ),
     ] = None
     duration_s: Annotated[float | None, Option("Duration of that step; 0.5.", "s")] = None
     load_Nm: Annotated[float, LOAD] = 0.0

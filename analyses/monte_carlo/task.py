@@ -111,7 +111,7 @@ def _whole(path: Path, count: int) -> bool:
 class StepCheck:
     """A step command from rest, of what the outermost loop follows."""
 
-    amplitude_rad: float  # linear axis: m; rad/s of a speed drive
+    amplitude_rad: float  # linear axis: m; rad/s of a speed drive, A or V of one without a velocity loop
     duration_s: float = 0.5
     load_Nm: float = 0.0  # load torque, constant
 

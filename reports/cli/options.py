@@ -59,6 +59,7 @@ _AT_OUTPUT = {
     ("slope", "rotary"): ("N*m/rad", 'a slope such as "5 N*m/rad"'),
     ("slope", "linear"): ("N/m", 'a slope such as "5 N/m"'),
 }
+_STEPS: dict[str, Kind] = {"position": "output", "velocity": "speed"}  # A and V are SI in any case
 
 
 _AMPERES = {"A": "limits.peak_current", "A/s": "limits.current_rate"}  # which are read as a file's
@@ -67,9 +68,9 @@ _AMPERES = {"A": "limits.peak_current", "A/s": "limits.current_rate"}  # which a
 def read_quantity(option: str, words: str | None, kind: Kind, drive: Design, unit: str = "") -> float | None:
     """A number of the command line with its unit; but for what is at the output also without it.
 
-    In SI a position, speed or load at the output, in its usual unit the outermost loop's command; the
-    drive's axis and outermost loop say the unit. A plain number is in ``unit``. ``option``: for the message.
-    Amperes of an AC motor are read as in its file; a plain number is of the model's.
+    In SI a position, speed or load at the output and a step of the command, in its usual unit the outermost
+    loop's command; the drive's axis and outermost loop say the unit. A plain number is in ``unit``.
+    ``option``: for the message. Amperes of an AC motor are read as in its file; a plain number is dc.
     """
     from actuator_lti.design.field import Structure
     from actuator_lti.design.fields import FIELDS
@@ -79,6 +80,8 @@ def read_quantity(option: str, words: str | None, kind: Kind, drive: Design, uni
     if words is None:
         return None
     bare: float | None = None
+    if kind == "step":
+        kind = _STEPS.get(drive.controller.outermost, "command")
     if kind in ("output", "speed", "load", "slope"):
         unit, allowed = _AT_OUTPUT[kind, drive.axis]
     else:

@@ -1,11 +1,14 @@
 """Monte Carlo studies: closed-form odds, worst cases, the same bits however computed, resuming, commands."""
 
 import json
+import math
+import tomllib
 from dataclasses import replace
 
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
+import tomli_w
 from toleranced import asked_twice, toleranced
 
 from actuator_lti import assemble_loops, load_design, read_design_text, write_design
@@ -25,6 +28,7 @@ from analyses.monte_carlo.judging import (
     unpacked,
 )
 from analyses.monte_carlo.result import MOST, clopper_pearson
+from analyses.monte_carlo.task import StepCheck, step_columns
 from analyses.specification.requirements import evaluate_requirements
 from analyses.studies.engine import Engine
 from analyses.studies.sampling import Table, sampler_of
@@ -271,6 +275,21 @@ def test_one_sample_is_printed_as_a_design_and_json_goes_to_standard_output_alon
     assert "allowed with --step" in cli.refused("montecarlo", "--duration", "2")
     assert made["verdict"] == "met"
     assert made["columns"]["nonlinear.overshoot"]["unit"] == "%"
+
+
+@pytest.mark.parametrize(("gone", "step", "si"), [
+    ({"position"}, "20 deg/s", math.radians(20.0)), ({"position", "velocity"}, "300 mA", 0.3),
+])  # fmt: skip
+def test_a_step_is_of_what_the_outermost_loop_follows(cli, gone, step, si, tmp_path):
+    text = tomllib.loads(toleranced(motor={"rotor_inertia": 5.0}))
+    text["control"] = {key: table for key, table in text["control"].items() if key not in gone}
+    path = tmp_path / "drive.toml"
+    path.write_text(tomli_w.dumps({key: table for key, table in text.items() if key != "requirement"}))
+    words = ("montecarlo", path, "--samples", 3, "--no-worst", "--out", tmp_path)
+    made = cli.data(*words, "--step", step)["columns"]["nonlinear.peak_current"]
+    rows = step_columns(StepCheck(si), Population(load_design(path), {}, 1))
+    assert made["mean"] == pytest.approx(rows["nonlinear.peak_current"][0], rel=0.1)
+    assert "wrong dimension" in cli.refused(*words, "--step", "1 deg")
 
 
 @pytest.mark.parametrize("name", ["ballscrew", "ilr33-amber"])
