@@ -176,6 +176,9 @@ def checked(design: Design, wanted: Sequence[str]) -> tuple[Element, ...]:
         if word == "feedforward" and control.position is None:
             reason = f"the design {name} has no control.position, whose command it needs"
             raise InputError(f"place = {word}: {reason}")
+        stage = "position" if word == "feedforward" else "velocity"
+        if getattr(control, stage).law is not None:
+            raise InputError(f"place = {word}: not beside control.{stage}.law, which may have it")
     return tuple(item for item in ELEMENTS if item in wanted)
 
 

@@ -26,6 +26,7 @@ from analyses.tuning.problem import gain_requirements, problem_of, read_requirem
 from analyses.tuning.solve import maximise
 from analyses.tuning.start import (
     allowed_range,
+    checked,
     magnitude_optimum,
     place,
     rule_gains,
@@ -35,6 +36,7 @@ from analyses.tuning.start import (
 from reports.sections.tune import summary
 from tests.changed import changed
 from tests.loops.loop_designs import source_drive
+from tests.loops.own_laws import as_law
 from tests.refusals import refused
 
 PERIOD, DELAY, GAIN = 1e-3, 3e-3, "control.position.gain"
@@ -295,6 +297,8 @@ def test_of_many_tolerances_the_strongest_make_the_corners_and_wishes_make_sense
         ("position.bandwith>=3 Hz", 'known: "bandwidth"'), ("every.phase_margin>=40", "unit like deg"),
     ):  # fmt: skip
         refused(read_requirement, wish, design, words=words)
+    for stage, element in (("velocity", "notch"), ("position", "feedforward")):
+        refused(checked, as_law(design, stage), [element], words=f"not beside control.{stage}.law")
 
 
 def servo(*requirements, stiffness=None, gain=0.02, integral_time=None, position=None):
