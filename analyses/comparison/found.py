@@ -147,7 +147,7 @@ def _name(whole: str, design: Design) -> FigureName:
         command = COMMAND_UNITS[design.axis, design.controller.outermost][0]
         unit, better = (command, 1) if quantity == "onset" else ("A", -1)
     if quantity == "onset":
-        words, at = "linear up to", f"{at} Hz"
+        words, at = "largest linear command", f"{at} Hz"
     elif known is not None and known.source == "stiffness":
         at = ""  # no load changes it
     elif at:

@@ -10,7 +10,7 @@ from actuator_lti.asked.quantities import shown_unit, unit_words
 from actuator_lti.asked.verdict import Tally, Verdict
 from actuator_lti.files.atomic import write_text
 from actuator_lti.files.reading import Tree
-from analyses.comparison.found import FigureName
+from analyses.comparison.found import FigureName, LargeSignal
 from analyses.comparison.variants import Compared, Comparison
 from analyses.specification.requirements import RequirementVerdict
 from analyses.validation.row import Row as Check
@@ -19,7 +19,7 @@ from reports.as_json import as_json
 from reports.numbers import capital, row_unit, show_signed, significant
 from reports.sections import compare_best, compare_figures
 from reports.sections.compare_best import SEEN, number, unstable_words
-from reports.sections.names import LOOPS
+from reports.sections.names import LOOPS, command_unit
 from reports.sections.requirements import item, label, limit_words
 from reports.sections.validation import loop_name, quantity_name
 from reports.terminal import Brief
@@ -162,11 +162,20 @@ def figures(comparison: Comparison) -> doc.Section:
     blocks: list[doc.Block] = []
     for group, title in GROUPS.items():
         if names := [name for name in comparison.names if name.group == group]:
-            blocks += _of_figures(title, names, head, comparison, parts)
+            note = _step_of(comparison) if group == "large" else ""
+            blocks += _of_figures(title, names, head, comparison, parts, note)
     variants = comparison.everything.variants
     moved = sum(bool(one.differences) or one.unstable != comparison.base.unstable for one in variants)
     result = f"{moved} of {len(variants)} variants change a figure of the base."
     return doc.section("figures", "Figures side by side", blocks, result=result, intro=_MARKS)
+
+
+def _step_of(comparison: Comparison) -> str:
+    """The command behind the large signals, which all designs of its kind get."""
+    base = comparison.base.variant.design
+    assert base is not None
+    size = command_unit(base).of(LargeSignal.plan(base).step)
+    return f"Steps of {size} from rest, with friction and every limit; a dash: not reached."
 
 
 def _of_figures(
