@@ -3,7 +3,6 @@
 from dataclasses import replace
 
 import numpy as np
-from numpy.polynomial.legendre import legvander
 from scipy.fft import irfft, next_fast_len, rfft
 from scipy.stats import chi2
 
@@ -69,8 +68,7 @@ def _against_the_best(current: Floats, load: Floats) -> tuple[Floats, float]:
     Shapes (n,) and (m,), m > n; the ratios have shape (m - n + 1,).
     """
     n, load, total = len(current), load - load.mean(), float(current @ current)
-    orders = min(ORDERS, int(PER_ROOT * np.sqrt(n)))  # polynomials orthonormal over the rows (Gram's)
-    waves = np.linalg.qr(legvander(np.linspace(-1.0, 1.0, n), orders - 1))[0].T
+    waves = _polynomials(n, min(ORDERS, int(PER_ROOT * np.sqrt(n))))
     drift, squares, own = slow_shares(len(waves)), np.append(0.0, np.cumsum(load**2)), waves @ current
     size = next_fast_len(len(load), real=True)  # what wraps around is not among the places
     spectra = np.conj(spectra := rfft(np.vstack([waves, current]), size), out=spectra)
@@ -89,3 +87,17 @@ def _against_the_best(current: Floats, load: Floats) -> tuple[Floats, float]:
         worth = n / correlation_time(rest - (drift[cut] * (waves @ rest)) @ waves)
     ratio = np.min(minus, axis=0) - minus[cut, best]
     return ratio, float(np.sqrt(1.0 - left[cut, best] / alone[cut]))
+
+
+def _polynomials(rows: int, orders: int) -> Floats:
+    """The first orthonormal polynomials over equally spaced rows (Gram's), shape (orders, rows).
+
+    By their recurrence, a tenth of the time of an orthogonal factor; it loses digits beyond twice the square
+    root of the rows.
+    """
+    k, x, waves = np.arange(orders), np.linspace(1.0 - rows, rows - 1.0, rows), np.zeros((orders, rows))
+    steps = np.sqrt(k * k * (rows * rows - k * k) / (4.0 * k * k - 1.0))
+    waves[0] = 1.0 / np.sqrt(rows)
+    for n in k[1:]:
+        waves[n] = (x * waves[n - 1] - steps[n - 1] * waves[n - 2]) / steps[n]
+    return waves
