@@ -1,6 +1,7 @@
 """A law of one's own (model.md section 10): both writings, what it does at limits, sources, refusals."""
 
 from dataclasses import replace
+from functools import partial
 from math import floor, inf, nan, pi
 from pathlib import Path
 from typing import Any
@@ -20,6 +21,7 @@ from actuator_lti.loops.assemble import loops_at
 from nonlinear import Drive, State, commands, simulate, tangent
 from nonlinear.bench.loop_setup import loop_setup
 from tests.changed import changed
+from tests.refusals import refused
 
 
 @pytest.mark.parametrize("part", range(4))
@@ -132,9 +134,9 @@ def test_a_run_starts_from_states_of_the_law() -> None:
     rested = simulate(design, commands.step(0.01), 0.1, limits_on=False).output_angle_rad
     assert np.ptp(runs[0] - rested) > 1e-6
     np.testing.assert_allclose(runs[1], runs[0], rtol=0, atol=1e-11)
+    run = partial(simulate, as_law(design, "velocity"), commands.step(0.01), 0.1)
     for wrong in ((1.0, 2.0), (np.inf,)):
-        with pytest.raises(InputError, match=r"initial\.law = .*allowed: 1 numbers"):
-            simulate(as_law(design, "velocity"), commands.step(0.01), 0.1, initial=State(law=wrong))
+        refused(run, initial=State(law=wrong), match=r"initial\.law = .*allowed: 1 numbers")
 
 
 def test_what_a_law_sees_and_how_it_is_limited() -> None:
@@ -231,18 +233,12 @@ def test_a_law_unstable_of_itself_is_allowed_and_said() -> None:
     assert stability_margins(assemble_loops(mine).velocity.open_loop) is not None
 
 
-def refused(call: Any, *arguments: Any) -> str:
-    with pytest.raises(InputError) as error:
-        call(*arguments)
-    return str(error.value)
-
-
 def test_what_is_no_law_is_refused_in_words(tmp_path: Path) -> None:
     base, T = load_design("ilr33-amber"), 1e-4
     unit = ([[0.5]], [[1.0]], [[1.0]], [[0.0]], T)
 
     def made(system: Any, inputs: Any = ("error",), stage: str = "velocity", **more: Any) -> str:
-        return refused(lambda: base.with_law(stage, system, inputs, **more))
+        return refused(base.with_law, stage, system, inputs, **more)
 
     assert "0.0001 s, that of its stage" in made((*unit[:4], 2e-4))
     assert "continuous; allowed: a sampled one of dt = 0.0001 s" in made(control.ss(*unit[:4]))
@@ -254,7 +250,8 @@ def test_what_is_no_law_is_refused_in_words(tmp_path: Path) -> None:
     assert "current, velocity, position" in made(unit, stage="torque")
     for system, inputs in ((unit, ["sped"]), (unit, None), (control.ss(*unit), None), (unit, "error")):
         assert "allowed: a list of command, error, speed" in made(system, inputs)
-    assert "B = other sizes: allowed: 1 x 2, with 2 inputs" in made(unit, np.array(["error", "speed"]))
+    with pytest.raises(InputError, match=r"B = other sizes: allowed: 1 x 2, with 2 inputs\n.*D = other"):
+        base.with_law("velocity", unit, np.array(["error", "speed"]))
     assert 'inputs = "omega": allowed' in made(unit, ["error", "omega"])
     assert "continuous: sampled, dt = 0.0001" in made(unit, continuous=unit)
     assert "continuous: allowed: without method" in made(unit[:4], method="tustin", continuous=unit[:4])
@@ -289,8 +286,8 @@ def test_what_is_no_law_is_refused_in_words(tmp_path: Path) -> None:
     notch = {"kind": "notch", "frequency": "120 Hz", "width": "60 Hz"}
     for bad in (nan, inf):
         words = f'.frequency = "{bad} rad/s": must be finite; allowed: a number with a unit like rad/s'
-        assert words in refused(lambda: base.add_filter("velocity", **{**notch, "frequency": bad}))  # noqa: B023
-    assert "not allowed beside" in refused(lambda: twice.add_filter("velocity", **notch))
+        assert words in refused(base.add_filter, "velocity", **{**notch, "frequency": bad})
+    assert "not allowed beside" in refused(twice.add_filter, "velocity", **notch)
     beside = "encoder.filter_time = 0.001 s: not allowed beside control.velocity.law, which may have it"
     assert refused(twice.with_values, {"encoder.filter_time": "1 ms"}).endswith(beside)
     speed = base.with_law("velocity", ([[0.5]], [[1.0, 0.0]], [[1.0]], [[1.0, 0.0]], T), ["error", "speed"])
