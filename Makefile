@@ -106,7 +106,7 @@ fuzz: $(ALL)
 
 # Harsh loops in all their forms against exact polynomials: make differential SECONDS=120 SEED=$$(date +%j)
 differential: $(ALL)
-	$(BIN)/python -m tests.margins.differential --seconds $(SECONDS) --seed $(SEED)
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m tests.margins.differential --seconds $(SECONDS) --seed $(SEED)
 
 bench: $(ALL)
 	$(BIN)/python -m benchmarks.run
