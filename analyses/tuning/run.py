@@ -24,7 +24,7 @@ from analyses.tuning.problem import (
     problem_of,
     why_not_searched,
 )
-from analyses.tuning.solve import RESERVE, Solution, solve, trade_off
+from analyses.tuning.solve import POINTS, RESERVE, Solution, solve, trade_off
 from analyses.tuning.start import Element, RuleGains, checked, neighbours, object_of, rule_gains, step_of_gain
 
 _BINDS = 0.02  # relative distance above the smallest within which a requirement counts as binding
@@ -50,7 +50,7 @@ def tune(
     wanted = gain_requirements(design, settings.requirements)
     allowed = checked(design, settings.place)
     choices = [each for count in range(len(allowed) + 1) for each in combinations(allowed, count)]
-    stages = len(choices) + 3
+    stages = len(choices) + 3 + POINTS * settings.curve
     tell = progress or (lambda done, total: None)
     tell(0, stages)
     rules = rule_gains(design)
@@ -75,7 +75,10 @@ def tune(
     confirmed = tuple(v for v in verdicts if v.requirement in wanted)
     tell(len(choices) + 2, stages)
     checks = tuple(result.nonlinear_checks(tuned, problem, gains, distances)) if settings.check else ()
-    curve = trade_off(problem, solution.gains, solution.working[:3]) if settings.curve else ()
+    curve = tuple[result.TradeOffPoint, ...]()
+    if settings.curve:
+        before = len(choices) + 2
+        curve = trade_off(problem, solution.gains, solution.working[:3], lambda k: tell(before + k, stages))
     tell(stages, stages)
     feasible = bool(distances.min() >= 0.0) and all(v.passes for v in confirmed)
     return result.TuningResult(

@@ -169,10 +169,12 @@ _SPAN = (0.6, 1.6)
 _MET = -1e-3
 
 
-def trade_off(problem: Problem, gains: Floats, working: Floats) -> tuple[TradeOffPoint, ...]:
+def trade_off(
+    problem: Problem, gains: Floats, working: Floats, tell: Callable[[int], None]
+) -> tuple[TradeOffPoint, ...]:
     """Largest smallest phase margin (all loops, ``working`` corners) at bandwidths about the tuned one.
 
-    Of the outermost loop.
+    Of the outermost loop; ``tell`` is called with how many of the `POINTS` bandwidths are done.
     """
     outer = problem.design.controller.outermost
     others = [
@@ -189,6 +191,7 @@ def trade_off(problem: Problem, gains: Floats, working: Floats) -> tuple[TradeOf
         starts = [gains, *result[-1:]]
         tried = [trade.best(start, wanted) for start in starts]
         result.append(trade.better([*starts, *tried], wanted))
+        tell(len(result))
     for k in range(len(targets) - 2, -1, -1):  # what a higher bandwidth allows, a lower one does too
         result[k] = trade.better(result[k : k + 2], targets[k])
     points = (trade.point(one[None, :]) for one in result)

@@ -239,8 +239,12 @@ def test_rules_of_gains_are_their_closed_forms():
 
 def test_every_corner_meets_the_requirements_in_whole_steps_and_steps_settle():
     asked = need("bandwidth", 60.0, loop="position", unit="Hz"), need("phase_margin", 60.0, loop="every")
-    tuned = tune(load_design("ilr33-amber"), TuningSettings(asked))
+    told: list[tuple[int, int]] = []
+    tuned = tune(load_design("ilr33-amber"), TuningSettings(asked), progress=lambda *of: told.append(of))
     assert (tuned.feasible, tuned.corners) == (True, 17)
+    stages = len(tuned.trade_off) + 4  # one choice of elements, the point of each bandwidth, three more
+    assert sorted(set(told)) == [(done, stages) for done in range(stages + 1)]
+    assert told == sorted(told)
     figures = {"every-phase_margin": "phase_margin_deg", "gain-margin": "gain_margin_db"}
     asked = {r.id: r for r in tuned.requirements}
     for name, figure in figures.items():
