@@ -119,7 +119,8 @@ class StepCheck:
     def __post_init__(self) -> None:
         lasts = 1.0 if self.duration_s is None else self.duration_s
         if not (0 < self.amplitude_rad < np.inf and 0 < lasts <= 100.0):
-            given = f"amplitude_rad = {self.amplitude_rad:g}, duration_s = {lasts:g}"
+            given = f"amplitude_rad = {self.amplitude_rad:g}"
+            given += "" if self.duration_s is None else f", duration_s = {lasts:g}"
             raise InputError(f"nonlinear step: {given}: must be above 0, a duration at most 100 s")
         finite_number("load_Nm", self.load_Nm)
 
