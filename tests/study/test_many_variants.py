@@ -11,6 +11,7 @@ import pytest
 from actuator_lti import load_design
 from actuator_lti.asked.verdict import Verdict
 from actuator_lti.design import with_overrides, write_design
+from actuator_lti.design.model import Requirement
 from analyses.comparison.variants import Comparison, compare
 from analyses.slugs import slug
 from analyses.specification.requirements import RequirementVerdict
@@ -101,6 +102,16 @@ def test_the_table_has_every_figure_of_every_design(many) -> None:
     failing = next(row for row in rows if row["design"] == FAILING)
     assert (failing["not_met"], failing["not_proven"]) == ("1", "0")
     assert float(failing["room_percent"]) < 0.0
+
+
+@pytest.mark.parametrize(("value", "share"), [(99.0, 0.01), (10.5, 0.05)])
+def test_what_is_left_is_a_share_of_the_nearer_of_two_limits(value: float, share: float) -> None:
+    """Of 10 to 100 Hz: 1 Hz of 100, 0.5 Hz of 10."""
+    limits = {"unit": "Hz", "minimum": 10.0, "maximum": 100.0}
+    of = Requirement(id="b", quantity="bandwidth", loop="position", **limits)
+    about = {"value": value, "distance": of.distance(value), "verdict": Verdict.MET}
+    one = RequirementVerdict(id="b", requirement=of, loop="position", **about)
+    assert nearness(one) == pytest.approx(share)
 
 
 UNSTABLE = """
