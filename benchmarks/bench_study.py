@@ -126,10 +126,10 @@ def _monte_carlo(quick: bool) -> Iterator[Row]:
     count = 2000 if quick else 10_000
     share = count / 10_000
     with tempfile.TemporaryDirectory() as folder:
-        monte_carlo(design, folder, MonteCarloSettings(samples=10, step=StepCheck(0.00873)))
+        monte_carlo(design, folder, MonteCarloSettings(samples=10, step=StepCheck(0.00873, 0.5)))
     for name, step, target in (
         ("linear samples, step figures too", None, 10.0),
-        ("nonlinear steps of 0.5 s besides", StepCheck(0.00873), 25.0),
+        ("nonlinear steps of 0.5 s besides", StepCheck(0.00873, 0.5), 25.0),
     ):
         settings = MonteCarloSettings(samples=count, step=step, worst_cases=False, chunk=512)
         with tempfile.TemporaryDirectory() as folder:
@@ -150,7 +150,7 @@ def _steps(count: int, share: float) -> Row:
 
     design = load_design("ilr33-amber")
     sampler = sampler_of(design)
-    step = StepCheck(0.00873)
+    step = StepCheck(0.00873, 0.5)
 
     def part(first: int) -> None:
         values = as_values(design, sampler.paths, sampler.draw(first, 250))

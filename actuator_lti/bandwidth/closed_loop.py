@@ -26,6 +26,7 @@ from actuator_lti.measured.response import is_measured
 from actuator_lti.systems.delay_response import DelayResponse, plain_behind_delay
 from actuator_lti.systems.exact_response import dc_noise, shown
 from actuator_lti.systems.plain_system import PlainSystem
+from actuator_lti.systems.precision import precision
 from actuator_lti.systems.rest_mode import without_rest_mode
 from actuator_lti.systems.root import root
 from actuator_lti.types import Delay
@@ -39,6 +40,7 @@ _POLE = "the response has a pole at zero frequency: it is no closed loop with a 
 _NO_GAIN = "DC gain is 0: no -3 dB bandwidth (the response is zero at zero frequency)"
 
 
+@precision()
 def closed_loop_bandwidth(system: Any, delay_s: Delay = 0.0, level: Level = "1/sqrt(2)") -> Bandwidth:
     """Bandwidths of a closed-loop response (give T itself, not the open loop).
 
@@ -122,6 +124,7 @@ def _bandwidth(
     )
 
 
+@precision()
 def peaks(system: Any, delay_s: Delay = 0.0) -> Peaks:
     """Peaks of S and T of the open loop L, one input, one output, under negative unit feedback.
 

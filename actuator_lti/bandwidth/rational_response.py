@@ -3,13 +3,14 @@
 import math
 from dataclasses import dataclass
 
-from flint import arb, arb_poly, ctx, fmpq, fmpz_poly
+from flint import arb, arb_poly, fmpq, fmpz_poly
 
 from actuator_lti.margins.distances import Distance
 from actuator_lti.margins.exact.crossings import smallest
 from actuator_lti.margins.exact.real_roots import positive_roots
 from actuator_lti.margins.exact.roots import V, split
 from actuator_lti.systems.exact_response import double
+from actuator_lti.systems.precision import precision
 
 _BITS = 128
 
@@ -50,7 +51,7 @@ class RationalResponse:
         for w, v in _passages(N.even * D.even + V * N.odd * D.odd):
             if w > fallen:
                 return None
-            with ctx.workprec(_BITS):
+            with precision(_BITS):
                 above = bool(arb_poly(imaginary)(v) > 0) == bool(self.dc > 0)
             half_turns += 1 if above == right else -1
             right = not right
@@ -61,5 +62,5 @@ class RationalResponse:
 
 def _passages(p: fmpz_poly) -> list[tuple[arb, arb]]:
     """w and v = w^2 of the positive real roots of odd multiplicity, in order."""
-    with ctx.workprec(_BITS):
+    with precision(_BITS):
         return [(v.sqrt(), v) for v, times in positive_roots(p) if times % 2]

@@ -13,6 +13,7 @@ from actuator_lti.step.delayed import delayed_response
 from actuator_lti.step.motion import Motion, rational_motion
 from actuator_lti.step.search import Pieces, Search
 from actuator_lti.systems.delay_response import plain_behind_delay
+from actuator_lti.systems.precision import precision
 from actuator_lti.types import Compared, Real
 
 _SHOWN = 2000
@@ -54,6 +55,7 @@ class StepFigures(Compared):
         )
 
 
+@precision()
 def step_figures(system: Any) -> StepFigures:
     """Figures of the unit step response of a stable system.
 

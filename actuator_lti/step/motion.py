@@ -12,7 +12,7 @@ import math
 from typing import Any
 
 import numpy as np
-from flint import acb, acb_mat, acb_poly, arb, arb_poly, ctx, fmpq, fmpq_poly
+from flint import acb, acb_mat, acb_poly, arb, arb_poly, fmpq, fmpq_poly
 
 from actuator_lti.errors import InputError, NumericalError
 from actuator_lti.margins.exact.loop import ExactLoop, exact_loop
@@ -21,6 +21,7 @@ from actuator_lti.margins.given import given_of
 from actuator_lti.margins.loop import RationalLoop
 from actuator_lti.step.search import OVER, Search
 from actuator_lti.systems.exact_response import dc_noise, double, near_dc, of_s, shown
+from actuator_lti.systems.precision import precision
 from actuator_lti.types import Complex, Real
 
 UNSTABLE = "the system is not stable: it has no step figures"
@@ -63,7 +64,7 @@ class Motion:
     def _transitions(self, A: acb_mat) -> list[Complex]:
         """Over 1, 2, 4 ... shortest spans, until nothing is left that counts."""
         moves: list[Complex] = []
-        with ctx.workprec(_BITS):
+        with precision(_BITS):
             move = A if self.sampled or not self._x.size else (A * arb(self.shortest)).exp()
             while len(moves) < _LEVELS:
                 moves.append(_doubles(move))

@@ -8,7 +8,7 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from flint import arb, ctx, fmpq, fmpq_poly
+from flint import arb, fmpq, fmpq_poly
 
 from actuator_lti.errors import NumericalError
 from actuator_lti.margins.delays.axis import IMAGINARY, REAL, Axis, Form, smallest, zeros
@@ -17,6 +17,7 @@ from actuator_lti.margins.delays.form import DelayForm, delay_form, without_seri
 from actuator_lti.margins.distances import Distance
 from actuator_lti.systems.exact_response import double
 from actuator_lti.systems.plain_system import PlainSystem
+from actuator_lti.systems.precision import precision
 from actuator_lti.types import Real
 
 _BITS = 128
@@ -73,14 +74,14 @@ class DelayResponse:
 
     def crossings(self, level: float, top: float | None = None) -> list[float]:
         """Where the gain passes a level, rad/s, in order, up to ``top`` or to where it stays below."""
-        with ctx.workprec(_BITS):
+        with precision(_BITS):
             form = Form(fmpq(1), fmpq(0), -(fmpq(*level.as_integer_ratio()) ** 2))
             top = self.loop.beyond(level) if top is None else top
             return [float(x.mid()) for x in zeros(self._axis, form, self._axis.edges(self.loop.lowest, top))]
 
     def smallest(self, distance: Distance, top: float | None = None) -> tuple[float, float]:
         """Smallest value of a distance over the axis, or up to ``top``, and where."""
-        with ctx.workprec(_BITS):
+        with precision(_BITS):
             return smallest(self._axis, distance, top=top)
 
     def first_turn(self, floor: float) -> float | None:
@@ -88,7 +89,7 @@ class DelayResponse:
 
         The phase lies in one half turn between two zeros of the real part; which one is counted.
         """
-        with ctx.workprec(_BITS):
+        with precision(_BITS):
             level = Form(fmpq(1), fmpq(0), -(fmpq(*floor.as_integer_ratio()) ** 2))
             half_turns = 0
             for edges in pairwise(self._axis.edges(self.loop.lowest, self.loop.beyond(floor))):
@@ -106,7 +107,7 @@ class DelayResponse:
 
     def phase(self, omega: Real) -> Real:
         """Phase, rad: -90 deg for each integrator at zero frequency, 180 deg less for a negative gain."""
-        with ctx.workprec(_BITS):
+        with precision(_BITS):
             top = max(float(omega.max()) * 1.001, 2.0 * self.loop.lowest)
             meets = zeros(self._axis, IMAGINARY, self._axis.edges(self.loop.lowest, top))
             values = np.array([self._value(arb(float(x))) for x in omega])

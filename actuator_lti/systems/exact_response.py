@@ -10,6 +10,7 @@ from actuator_lti.margins.exact.loop import ExactLoop
 from actuator_lti.margins.exact.roots import all_roots
 from actuator_lti.margins.given import ULP
 from actuator_lti.margins.loop import RationalLoop
+from actuator_lti.systems.precision import precision
 
 _EPS = float(np.finfo(float).eps)
 _NEAR_DC = 1e-7  # a pole this near to zero frequency may be one that the response does not show
@@ -36,7 +37,7 @@ def shown(exact: ExactLoop, loop: RationalLoop) -> ExactLoop:
     centre, size = (1.0, 1.0) if loop.in_z else (0.0, _size(loop))
     if float(np.abs(np.linalg.eigvals(loop.A) - centre).min()) > _CLOSE * size:
         return exact
-    with flint.ctx.workprec(_BITS):
+    with precision(_BITS):
         every = [(flint.acb(0), exact.poles.at_zero)] * (exact.D[0] == 0) + all_roots(exact.D)
         near = [p for p, times in every if times == 1 and _off_dc(p, loop) < _NEAR_DC]
         others = [p for p, times in every if not any(p is each for each in near) for _ in range(times)]

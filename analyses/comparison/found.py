@@ -15,7 +15,6 @@ from importlib import metadata
 from math import isnan, pi
 from pathlib import Path
 
-import numpy as np
 from pydantic import TypeAdapter
 
 from actuator_lti.asked.drive_figure import drive_figure
@@ -32,7 +31,6 @@ from analyses.large_signal.tones import full_command
 from analyses.linear.loop_figures import LoopFigures
 from analyses.linear.loop_survey import with_cogging
 from analyses.monte_carlo.task import StepCheck, step_columns
-from analyses.specification.capability import drive_figures
 from analyses.specification.requirements import RequirementVerdict
 from analyses.studies.proof import code_version
 from analyses.validation.row import Row
@@ -72,7 +70,6 @@ class LargeSignal:
 
     frequencies_hz: tuple[float, ...]  # where the largest linear amplitude is given
     step: float  # of the command: the full deflection (output side), half of the top speed or peak current
-    duration_s: float
     loads_Nm: tuple[float, ...]
     command: tuple[str, str]  # axis and stage that take it
 
@@ -81,14 +78,7 @@ class LargeSignal:
         """Choose commands from the base, so that all designs that take such get the same."""
         outer, full = base.controller.outermost, full_command(base)
         step = full if outer == "position" else 0.5 * full
-        figures = [drive_figures(base, load) for load in base.validation.loads_Nm]
-        paces = {
-            "position": [each.output_rate_rad_s for each in figures],
-            "velocity": [each.acceleration_rad_s2 for each in figures],
-        }.get(outer, [])
-        slowest = min((pace for pace in paces if pace > 0.0), default=np.inf)
-        duration = min(20.0, 0.5 + 2.0 * step / slowest)
-        return cls((1.0, 5.0), step, duration, base.validation.loads_Nm, _command(base))
+        return cls((1.0, 5.0), step, base.validation.loads_Nm, _command(base))
 
     def figures(self, design: Design, loops: Loops) -> dict[str, float | None]:
         """Largest linear amplitudes, and the nonlinear step at every load; of another command its own."""
@@ -103,7 +93,7 @@ class LargeSignal:
                 continue  # beyond Nyquist of the position loop
             figures[f"large.onset@{frequency:g}"] = float(linear_limit.amplitude_rad[0]) * shown
         for load in self.loads_Nm:
-            step = StepCheck(self.step, self.duration_s, load)
+            step = StepCheck(self.step, load_Nm=load)
             columns = step_columns(step, Population(design, {}, 1))
             for name in ("rise_time", "overshoot", "settling_time", "peak_current"):
                 value = float(columns[f"nonlinear.{name}"][0])

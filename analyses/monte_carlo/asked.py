@@ -38,7 +38,9 @@ class Asked(OnMachines):
             kind="step",
         ),
     ] = None
-    duration_s: Annotated[float | None, Option("Duration of that step; 0.5.", "s")] = None
+    duration_s: Annotated[
+        float | None, Option("Duration of that step; what travel and slowest mode take.", "s")
+    ] = None
     load_Nm: Annotated[float, LOAD] = 0.0
     operating_point: Annotated[str, POINT] = "sliding"
     at_least: Annotated[
@@ -66,13 +68,12 @@ def study(design: Design, asked: Asked, *, out: Path, progress: Progress = None)
     from analyses.studies.sampling import read_table, sampler_of
 
     table = None if asked.from_samples is None else read_table(asked.from_samples, variable_paths(design))
-    lasting = StepCheck.duration_s if asked.duration_s is None else asked.duration_s
     settings = MonteCarloSettings(
         samples=asked.samples,
         seed=asked.seed,
         operating_point=asked.operating_point,  # type: ignore[arg-type]
         load_Nm=asked.load_Nm,
-        step=None if asked.step is None else StepCheck(asked.step, lasting, asked.load_Nm),
+        step=None if asked.step is None else StepCheck(asked.step, asked.duration_s, asked.load_Nm),
         table=table,
         worst_cases=asked.worst,
     )

@@ -26,6 +26,7 @@ from actuator_lti.files.atomic import write_bytes
 from actuator_lti.files.reading import Tree, read_json
 from actuator_lti.start.public_arguments import asked
 from analyses.monte_carlo.judging import drive_column, in_populations, loop_column, loop_columns, loops_of
+from analyses.motion.settling import step_ticks
 from analyses.studies.engine import Arrays, Chunk
 from analyses.studies.proof import code_version
 from analyses.studies.sampling import Sampler, as_values
@@ -112,14 +113,22 @@ class StepCheck:
     """A step command from rest, of what the outermost loop follows."""
 
     amplitude_rad: float  # linear axis: m; rad/s of a speed drive, A or V of one without a velocity loop
-    duration_s: float = 0.5
+    duration_s: float | None = None  # ``None``: `step_ticks` of the nominal design
     load_Nm: float = 0.0  # load torque, constant
 
     def __post_init__(self) -> None:
-        if not (0 < self.amplitude_rad < np.inf and 0 < self.duration_s <= 100.0):
-            given = f"amplitude_rad = {self.amplitude_rad:g}, duration_s = {self.duration_s:g}"
+        lasts = 1.0 if self.duration_s is None else self.duration_s
+        if not (0 < self.amplitude_rad < np.inf and 0 < lasts <= 100.0):
+            given = f"amplitude_rad = {self.amplitude_rad:g}"
+            given += "" if self.duration_s is None else f", duration_s = {lasts:g}"
             raise InputError(f"nonlinear step: {given}: must be above 0, a duration at most 100 s")
         finite_number("load_Nm", self.load_Nm)
+
+    def lasts_s(self, design: Design) -> float:
+        """How long a design follows it."""
+        if self.duration_s is not None:
+            return self.duration_s
+        return float(step_ticks(design, np.array([self.amplitude_rad]))[0]) * design.controller.period_s
 
 
 STEP: Mapping[str, tuple[str, Callable[[BatchResult], np.ndarray]]] = {
@@ -138,7 +147,7 @@ STEP: Mapping[str, tuple[str, Callable[[BatchResult], np.ndarray]]] = {
 def step_rows(step: StepCheck, population: Population) -> Rows:
     rows = Rows.of(population.stacked, population.count)
     rows["load"] = step.load_Nm
-    rows["ticks"] = np.maximum(np.round(step.duration_s / rows["period"]), 1.0)
+    rows["ticks"] = np.maximum(np.round(step.lasts_s(population.design) / rows["period"]), 1.0)
     rows.step_figures(step.amplitude_rad)
     rows.extremes()
     rows.step("command", step.amplitude_rad)

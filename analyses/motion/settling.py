@@ -11,13 +11,16 @@ from actuator_lti.asked.quantities import QUANTITIES
 from actuator_lti.asked.verdict import Verdict
 from actuator_lti.design.checks import CHECKS
 from actuator_lti.design.model import Design, Requirement, Waiver
+from actuator_lti.drive.facts import capability
 from actuator_lti.drive.operating import straight
+from actuator_lti.drive.profile import command_mean
 from actuator_lti.drive.wiring import wire
 from actuator_lti.files.reading import Tree
 from actuator_lti.loops import Loops
 from actuator_lti.loops.sampled import tick_system
 from actuator_lti.systems.settling import settling_ticks
-from analyses.large_signal.tones import TANH_TOLERANCE, full_command
+from actuator_lti.types import Floats
+from analyses.large_signal.tones import LONGEST_TICKS, TANH_TOLERANCE, full_command
 from analyses.limit_cycles.stick_slip import stick_slip_cycle
 from nonlinear.rows import Rows
 from nonlinear.runs.trajectory import COMMAND_UNITS, Trajectory
@@ -61,6 +64,39 @@ def settling_ticks_of(design: Design, left: float) -> float:
     """
     there = design if design.controller.position is not None else straight(design)
     return settling_ticks(tick_system(wire(there)).slowest, left)
+
+
+TRAVELS, SWINGS, OVER = (
+    3.0,
+    12.0,
+    1e-6,
+)  # that a step is followed for; until so much of the slowest mode is left
+
+
+def step_ticks(design: Design, sizes: Floats) -> Floats:
+    """Ticks for which a step of the command is followed, for each size: travel, swing and the slowest mode.
+
+    Travel at the least rate that a load of the validation or the profile of the command leaves, a swing in
+    ``sqrt(size/acceleration)``; a speed is reached by the acceleration. No more than `LONGEST_TICKS`.
+    """
+    stage, Ts, profile = design.controller.outermost, design.controller.period_s, design.command
+    known = [capability(design, load) for load in design.validation.loads_Nm]
+    rate = _least(profile.rate_rad_s, *(float(one.output_rate_rad_s) for one in known))
+    push = _least(profile.acceleration_rad_s2, *(float(one.acceleration_rad_s2) for one in known))
+    settled, mean = settling_ticks_of(design, OVER), command_mean(design)
+    ticks = np.full(np.shape(sizes), settled if settled < inf else 0.0)
+    if stage == "position":
+        ticks += (TRAVELS * sizes / rate + SWINGS * np.sqrt(sizes / push)) / Ts
+    elif stage == "velocity":
+        ticks += TRAVELS * sizes / push / Ts
+    if mean is not None:
+        ticks += mean.samples * design.controller.position_loop.every
+    return np.minimum(np.ceil(ticks) + 1.0, LONGEST_TICKS)
+
+
+def _least(*paces: float) -> float:
+    """The least of those that move at all; inf without any."""
+    return min((pace for pace in paces if pace > 0.0), default=inf)
 
 
 def counted(rest: Rest, least: float) -> Rest:

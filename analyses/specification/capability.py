@@ -11,12 +11,15 @@ from actuator_lti.design.plant import no_load_speed
 from actuator_lti.drive import facts
 from actuator_lti.drive.facts import stall_torque_Nm, steady_torque_Nm
 from actuator_lti.drive.steady import current_limit_torque_Nm, motor_torque_Nm, voltage_limit_torque_Nm
-from analyses.large_signal.tones import tone
+from analyses.large_signal.tones import LONGEST_TICKS, tone
 from nonlinear import commands, simulate
 
 POINTS, PLANE_POINTS = 400, 41
-LONGEST_TICKS, RUN_UP_TICKS = 60_000, 40_000
+STEP_TICKS, RUN_UP_TICKS = 60_000, 40_000
 STEADY_SHARE = 0.1
+PERIODS = (
+    8  # of a sine after settling, of which the last counts: a rate limit halves what is left in each half
+)
 
 
 @dataclass(frozen=True)
@@ -70,15 +73,16 @@ def manoeuvres(
         every = design.controller.position_loop.every
         hz = min(share * slow_hz, 0.2 / (every * design.controller.period_s))
         chosen = tone(hz, design)
-        period = chosen.ticks / chosen.cycles * design.controller.period_s  # two of them; the second counts
+        period = chosen.ticks / chosen.cycles * design.controller.period_s
         sine, said = commands.sine(full, chosen.frequency_hz), f"{name} ({hz:.3g} Hz)"
-        yield _manoeuvre(design, said, sine, 2.0 * period, load_Nm, period)
+        yield _manoeuvre(design, said, sine, settling_s + PERIODS * period, load_Nm, period)
 
 
 def _manoeuvre(
     design: Design, name: str, command: commands.Command, time: float, load_Nm: float, period: float | None
 ) -> Manoeuvre:
-    time = min(time, LONGEST_TICKS * design.controller.period_s)
+    most = STEP_TICKS if period is None else LONGEST_TICKS
+    time = min(time, most * design.controller.period_s)
     run = simulate(design, command, time, load_Nm, raise_on_failure=False)
     count = run.time_s.size if period is None else min(round(period / run.period_s), run.time_s.size)
     torque = motor_torque_Nm(design, run.current_A, run.voltage_V)[-count:]
@@ -202,7 +206,7 @@ def capability(design: Design, load_Nm: float, settling_s: float) -> Capability:
     Ts = design.controller.period_s
     force_bound = figures.rate_limit == "force" and friction.viscous(1) > 0.0
     viscous_s = design.inertia_kgm2 / friction.viscous(direction) if force_bound else 0.0
-    time = min(12.0 * rate / push + 8.0 * settling_s + 8.0 * viscous_s, RUN_UP_TICKS * Ts)
+    time = min(12.0 * rate / push + 8.0 * settling_s + 8.0 * viscous_s, LONGEST_TICKS * Ts)
     load = direction * -abs(load_Nm) if design.load.path == "back-drivable" else load_Nm
     run = simulate(design, commands.ramp(direction * 3.0 * rate), time, load)
     speed = direction * run.motor_speed_rad_s / design.total_ratio

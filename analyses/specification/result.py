@@ -1,6 +1,5 @@
 """Everything that a specification of the actuator asks for, in one result; step times from small to full."""
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,13 +9,12 @@ from actuator_lti.design.model import Design
 from actuator_lti.loops import Loops, assemble_loops
 from analyses.finite import finite
 from analyses.large_signal.tones import TANH_TOLERANCE, settling_ticks_in_periods
+from analyses.motion.settling import step_ticks
 from analyses.specification import capability
 from nonlinear import LIMITERS, Rows
 
 SMALLEST = 0.01  # of full deflection: the small-signal step, beside the design's own fractions
 BAND = 0.02
-SETTLINGS = 2.0  # after travel and swing; in one the slowest mode falls to 1e-9
-LONGEST_TICKS = 60_000
 
 
 @dataclass(frozen=True)
@@ -34,23 +32,17 @@ class StepTime:
     limits: dict[str, float]  # fraction of the time simulated in which each limit acts, where it does
 
 
-def step_times(
-    design: Design, rate_rad_s: float, acceleration_rad_s2: float, settling_s: float
-) -> tuple[StepTime, ...]:
+def step_times(design: Design) -> tuple[StepTime, ...]:
     """Simulate steps at every fraction of full deflection and every load torque."""
     fractions = sorted({SMALLEST, *design.validation.amplitude_fractions})
     loads = design.validation.loads_Nm
-    full, Ts = design.validation.full_deflection_rad, design.controller.period_s
-    sizes = np.tile(np.array(fractions) * full, len(loads))
+    sizes = np.tile(np.array(fractions) * design.validation.full_deflection_rad, len(loads))
     rows = Rows.of(design, len(sizes))
     rows.step("command", sizes)
     rows["load"], rows["tanh_tolerance"] = np.repeat(loads, len(fractions)), TANH_TOLERANCE
     rows.step_figures(sizes, BAND)
     rows.extremes()
-    travel = sizes / rate_rad_s if 0.0 < rate_rad_s < math.inf else np.zeros(len(sizes))
-    swing = np.sqrt(sizes / acceleration_rad_s2) if 0.0 < acceleration_rad_s2 < math.inf else travel
-    wait = np.minimum(np.ceil((3.0 * travel + 12.0 * swing + SETTLINGS * settling_s) / Ts), LONGEST_TICKS)
-    rows["ticks"] = wait
+    rows["ticks"] = step_ticks(design, sizes)
     result = rows.run()
     speeds, currents = result.extreme("motor_speed_rad_s"), result.extreme("current_A")
     peaks = np.maximum(-speeds[0], speeds[1]) / design.total_ratio
@@ -100,8 +92,9 @@ def specification(design: AnyDesign, loops: Loops | None = None) -> Specificatio
     result = tuple(capability.capability(design, load, settling_s) for load in loads)
     rates = [one.figures.output_rate_rad_s for one in result]
     pushes = [one.figures.acceleration_rad_s2 for one in result]
-    times = step_times(design, min(rates), min(pushes), settling_s)
     each = zip(loads, rates, pushes, strict=True)
     moves = tuple(move for at in each for move in capability.manoeuvres(design, *at, settling_s))
     top = max(rates) * design.total_ratio
-    return Specification(design, result, times, capability.torque_speed_plane(design, top), moves)
+    return Specification(
+        design, result, step_times(design), capability.torque_speed_plane(design, top), moves
+    )

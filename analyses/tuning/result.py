@@ -153,10 +153,10 @@ def nonlinear_checks(
     points = problem.all_corners[[0, worst][: len(names)]]
     population = Population(tuned, problem.values_at(gains[None, :], points, problem.factors), len(names))
     for size in (0.05 * plan.step, plan.step):
-        columns = step_columns(StepCheck(size, plan.duration_s), population)
+        step = StepCheck(size)
+        columns, percent_ms = step_columns(step, population), 10.0 * step.lasts_s(tuned)
         for k, corner in enumerate(names):
             seen = {name.partition(".")[2]: float(column[k]) for name, column in columns.items()}
-            percent_ms = 10.0 * plan.duration_s
             acted = {name: percent_ms * seen[f"{name}_limited"] for name in ("speed", "current", "voltage")}
             limited = ", ".join(f"{name} {ms:.3g} ms" for name, ms in acted.items() if ms > 0.0)
             rise, settling = finite(seen["rise_time"]), finite(seen["settling_time"])

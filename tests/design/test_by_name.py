@@ -123,7 +123,7 @@ def test_a_bad_argument_is_an_input_error_that_says_what_is_allowed(ask) -> None
     (lambda: DESIGN.with_law("velocity", control.tf([1.0, 0.0], [1.0], 1e-3), ["error"]), "system: improper"),
     (lambda: sweep(DESIGN, "limits.voltage", "10 V"), "must be several"),
     (lambda: stability_margins(5), "system = 5: allowed: a StateSpace"),
-    (lambda: StepCheck(-1.0), "amplitude_rad = -1, duration_s = 0.5: must be above 0"),
+    (lambda: StepCheck(-1.0), "amplitude_rad = -1: must be above 0"),
     (lambda: DESIGN.with_law("velocity", ([],) * 4 + (1e-4,), []), "inputs = an empty list: allowed: a list"),
 ])  # fmt: skip
 def test_a_refusal_names_what_is_wrong(ask, words: str) -> None:

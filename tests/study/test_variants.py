@@ -7,12 +7,15 @@ from dataclasses import replace
 import pytest
 
 from actuator_lti import assemble_loops, load_design, onset
-from actuator_lti.design import with_overrides
+from actuator_lti.batch import Population
+from actuator_lti.design import with_overrides, with_values
 from actuator_lti.design.model import Design, Requirement
 from analyses.comparison.found import LargeSignal, figure_names
 from analyses.comparison.variants import changes, compare
+from analyses.monte_carlo.task import StepCheck, step_columns
 from analyses.specification.capability import drive_figures
 from analyses.specification.requirements import evaluate_requirements
+from analyses.specification.result import step_times
 from analyses.specification.sensitivity import sensitivities
 from analyses.studies.study import Study, Variant, load_study, study_of, study_or_design
 from reports.sections.compare import batches, brief, predictions, section
@@ -234,6 +237,20 @@ def test_an_amplitude_is_in_the_unit_of_the_command(changes, unit, per_si):
     assert found["large.onset@5"] == pytest.approx(per_si * onset(loops, [10.0 * math.pi]).amplitude_rad[0])
     (name,) = figure_names([(found, design)])
     assert name.unit == unit
+
+
+@pytest.mark.parametrize(("path", "value", "settled_s"), [
+    ("control.position.gain", 1.0, math.log(50.0)), ("command.rate", 0.05, 0.175 / 0.05),
+])  # fmt: skip
+def test_steps_of_a_slow_drive_are_followed_until_they_have_settled(path, value, settled_s):
+    """A lag of 1 s, and a slow profile; compared, sampled and specified steps ended before."""
+    slow = with_values(load_design("ilr33-amber"), {path: value})
+    full = slow.validation.full_deflection_rad
+    found = LargeSignal.plan(slow).figures(slow, assemble_loops(slow))
+    sampled = step_columns(StepCheck(full), Population(slow, {}, 1))["nonlinear.settling_time"]
+    specified = [one.settling_time_s for one in step_times(slow) if one.fraction == 1.0]
+    times = [found["large.settling_time@0"], found["large.settling_time@8"], *sampled, *specified]
+    assert times == pytest.approx([settled_s] * 5, rel=0.03)
 
 
 def test_designs_of_another_kind_stand_beside_the_base_in_their_own_units_and_on_their_own_loops():

@@ -2,7 +2,7 @@
 
 import math
 
-from flint import acb, arb, ctx, fmpq
+from flint import acb, arb, fmpq
 
 from actuator_lti.errors import NumericalError
 from actuator_lti.margins.assemble import FARTHEST, Crossing, Figures, assembled
@@ -14,6 +14,7 @@ from actuator_lti.margins.results import StabilityMargins
 from actuator_lti.margins.single import Agreement
 from actuator_lti.margins.tail import listed, tail_note
 from actuator_lti.margins.trust import TOUCH
+from actuator_lti.systems.precision import precision
 
 _BITS = 128
 _UNDER_ONE = 0.9
@@ -35,7 +36,7 @@ def certified_delayed_margins(
     ``delay_s`` is that in series, for the result; the distances of ``start``, an answer in double precision,
     are where the search for smaller ones begins. `NumericalError`: something could not be determined.
     """
-    with ctx.workprec(_BITS):
+    with precision(_BITS):
         axes = [Axis(loop) for loop in loops]
         counts = [_unstable(axis) for axis in axes]
         notes = counted(counts)

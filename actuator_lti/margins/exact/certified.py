@@ -19,6 +19,7 @@ from actuator_lti.margins.exact.roots import within
 from actuator_lti.margins.given import ULP, Given
 from actuator_lti.margins.results import StabilityMargins
 from actuator_lti.margins.single import Agreement
+from actuator_lti.systems.precision import precision
 from actuator_lti.types import Complex, Mask, Real
 
 _METHOD = "roots of exact polynomials, isolated in certified intervals; no grid"
@@ -29,6 +30,7 @@ _MANY = 2.0  # a modulus below which half of the poles lie, where counting shows
 
 
 @lru_cache(maxsize=64)
+@precision()
 def certified_margins(given: Given, band_rad_s: tuple[float, float] | None = None) -> StabilityMargins:
     """All margins of a rational loop from the exact values of its doubles, see `stability_margins`.
 

@@ -7,7 +7,7 @@ from functools import cached_property, lru_cache, partial
 from itertools import pairwise
 
 import numpy as np
-from flint import acb, arb, ctx, fmpz, fmpz_poly
+from flint import acb, arb, fmpz, fmpz_poly
 
 from actuator_lti.errors import NumericalError
 from actuator_lti.margins.assemble import Crossing
@@ -16,6 +16,7 @@ from actuator_lti.margins.exact.loop import ExactLoop
 from actuator_lti.margins.exact.real_roots import EVERYWHERE, Spans, octaves, positive_roots
 from actuator_lti.margins.exact.roots import FEW, Split, all_roots, at_enough_bits, free_of, split
 from actuator_lti.margins.trust import TOUCH
+from actuator_lti.systems.precision import precision
 
 _FIRST_BITS = 96
 _TURN_BITS = 48
@@ -44,13 +45,13 @@ class _Line:
         """
         slope = self.p.derivative()
         both = () if self.p.degree() <= FEW else (slope, slope.derivative())
-        with ctx.workprec(_TURN_BITS):
+        with precision(_TURN_BITS):
             return [v.mid() for q in both for v, _ in positive_roots(q)]
 
     def met(self, turns: Sequence[arb], touched_ends: Sequence[bool] = (False, False)) -> list[Crossing]:
         """The roots, touches merged."""
         few, bits = self.p.degree() <= FEW, _FIRST_BITS + self.p.degree()
-        with ctx.workprec(bits):
+        with precision(bits):
             missed = few or any(abs(self.off(self.N, self.D, v).mid()) <= 10.0 * TOUCH for v in turns)
 
         def accurate() -> list[Crossing] | None:
@@ -165,13 +166,13 @@ def smallest(N: fmpz_poly, D: fmpz_poly, distance: Distance) -> tuple[float, flo
 def _deepest(above: fmpz_poly, below: fmpz_poly) -> Spans:
     """Where the square of a distance is below the lowest of some samples, and of one in each such span."""
     spans, level = EVERYWHERE, arb("inf")
-    with ctx.workprec(_FIRST_BITS + 2 * above.degree()):
+    with precision(_FIRST_BITS + 2 * above.degree()):
         places = [arb(2) ** x for x in np.linspace(*octaves(above * below), _SAMPLES).tolist()]
         for _ in range(2):
             level = min([level, *((above(v) / below(v)).upper() for v in places if below(v) > 0)])
             man, exp = (level * (1 + arb((1, -_SAME)))).upper().man_exp()
             over = above * (1 << max(-int(exp), 0)) - below * (man << max(int(exp), 0))
-            with ctx.workprec(_FIRST_BITS):
+            with precision(_FIRST_BITS):
                 edges = [v for v, _ in positive_roots(over)]
             if not edges:
                 return EVERYWHERE

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from flint import acb, arb, ctx
+from flint import acb, arb
 
 from actuator_lti.margins.along import Along
 from actuator_lti.margins.checked import passed_into, refuse_neutral
@@ -24,6 +24,7 @@ from actuator_lti.margins.loop import RationalLoop
 from actuator_lti.margins.results import StabilityMargins
 from actuator_lti.margins.single import Agreement
 from actuator_lti.margins.trust import Doubtful, in_double_precision
+from actuator_lti.systems.precision import precision
 from actuator_lti.types import Complex, Real
 
 _BITS = 160  # of the roots
@@ -59,7 +60,7 @@ class ProductLoop(RationalLoop):
 @in_double_precision()
 def late_margins(given: Given, delay_s: float, band: tuple[float, float] | None) -> StabilityMargins:
     """All margins of a rational loop behind a delay; `Doubtful` where its data do not determine them."""
-    with ctx.workprec(_BITS):
+    with precision(_BITS):
         loop = exact_loop(given)
         if loop.N.degree() < 0:  # nothing is fed back, early or late
             return replace(certified_margins(given, band), delay_s=delay_s)
@@ -87,7 +88,7 @@ def late_margins(given: Given, delay_s: float, band: tuple[float, float] | None)
 @in_double_precision()
 def late_distances(given: Given, delay_s: float, distances: Sequence[Distance]) -> list[Place]:
     """Smallest values of distances of a loop behind a delay, each with its w, as its doubles have them."""
-    with ctx.workprec(_BITS):
+    with precision(_BITS):
         loop = exact_loop(given)
         if loop.N.degree() < 0:
             return [(distance.at_no_gain, 0.0) for distance in distances]

@@ -17,6 +17,7 @@ from flint import arb, arb_poly, ctx, fmpz, fmpz_poly
 
 from actuator_lti.errors import NumericalError
 from actuator_lti.margins.exact.roots import FEW, all_roots, is_crowded
+from actuator_lti.systems.precision import precision
 from actuator_lti.types import Real
 
 _MOST_BITS = 1 << 15
@@ -42,7 +43,7 @@ def positive_roots(p: fmpz_poly, spans: Spans = EVERYWHERE) -> list[tuple[arb, i
         return sorted(real, key=lambda root: float(root[0].mid()))
     roots, least = [], arb((1, -ctx.prec))
     for factor, times, places in isolated:
-        with ctx.workprec(ctx.prec + factor.degree() + 32):
+        with precision(ctx.prec + factor.degree() + 32):
             q = _Evaluated(factor)
             roots += [(q.root_in(low, high, least), times) for low, high in places]
     return sorted(roots, key=lambda root: float(root[0].mid().log()))
@@ -55,7 +56,7 @@ def _places(coefficients: tuple[Any, ...], spans: Spans) -> Places | None:
     None where that does not help: a root lies at an end of an interval.
     """
     p = fmpz_poly(list(coefficients))
-    with ctx.workprec(_MOST_BITS):
+    with precision(_MOST_BITS):
         with suppress(NumericalError):
             return ((p, 1, tuple(_separated(p, spans, 4 * (p.degree() + 64)))),)
         factors = p.factor_squarefree()[1]
@@ -179,6 +180,6 @@ class _Evaluated:
         while not (value > 0 or value < 0):
             if (bits := 2 * bits) > 2 * _MOST_BITS:
                 raise NumericalError(_TOO_CLOSE)
-            with ctx.workprec(bits):
+            with precision(bits):
                 value = arb_poly(self.p)(v)
         return 1 if value > 0 else -1

@@ -9,6 +9,7 @@ from typing import Any, TypeVar
 from flint import acb, arb, arb_poly, ctx, fmpq_poly, fmpz_poly
 
 from actuator_lti.errors import NumericalError
+from actuator_lti.systems.precision import precision
 
 _MOST_BITS = 1 << 15
 _MANY_BITS = 2000  # of coefficients: of a usual loop of four states 500
@@ -67,7 +68,7 @@ def is_crowded(p: fmpz_poly) -> bool:
 @lru_cache(maxsize=32)
 def _isolated(coefficients: tuple[Any, ...], bits: int) -> list[tuple[acb, int]]:
     """Margins and peaks of one loop ask for the same roots, which take seconds of a hundred states."""
-    with ctx.workprec(bits):
+    with precision(bits):
         p = fmpz_poly(list(coefficients))
         factors: Any = p.factor()[1] if is_crowded(p) and p.degree() <= FEW else [(p, 1)]
         found = ((root, times * own) for q, times in factors for root, own in q.complex_roots())
@@ -136,7 +137,7 @@ def half_planes(p: fmpz_poly) -> HalfPlanes:
 def right_of_axis(p: fmpz_poly) -> int | None:
     """Roots to the right of the axis, by the signs of Routh's first column; ``None`` where one is zero."""
     for doubled in range(6):
-        with ctx.workprec((p.degree() + 64) << doubled):
+        with precision((p.degree() + 64) << doubled):
             column = _routh(p)
         if all(x > 0 or x < 0 for x in column):
             return sum((x > 0) is not (y > 0) for x, y in pairwise(column))
@@ -187,7 +188,7 @@ def _clear_of_axis(p: fmpz_poly) -> list[tuple[acb, int]]:
 def at_enough_bits(find: Callable[[], Answer | None], bits: int, what: str) -> Answer:
     """The first answer that is not ``None``, the working precision doubled each time."""
     while bits <= _MOST_BITS:
-        with ctx.workprec(bits):
+        with precision(bits):
             if (answer := find()) is not None:
                 return answer
         bits *= 2
