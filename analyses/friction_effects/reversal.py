@@ -11,6 +11,8 @@ from actuator_lti.systems.root import root
 from actuator_lti.types import Floats
 from analyses.friction_effects.breakaway import StaticThreshold
 from analyses.friction_effects.orbit import Orbit
+from analyses.large_signal.tones import LEFT
+from analyses.motion.settling import settling_ticks_of
 from nonlinear import commands, simulate
 from nonlinear.bench.operating_motion import OperatingMotion, operating_motion_at
 
@@ -41,8 +43,16 @@ class Hysteresis:
         return self.width_rad - self.linear_width_rad
 
 
-def hysteresis(design: Design, load_Nm: float, static: StaticThreshold, settling_ticks: int) -> Hysteresis:
-    """Simulate a slow triangle with and without dry friction and play and compare the two branches."""
+def hysteresis(
+    design: Design, load_Nm: float, static: StaticThreshold, settling_ticks: int
+) -> Hysteresis | None:
+    """Simulate a slow triangle with and without dry friction and play and compare the two branches.
+
+    ``None`` where the drive is not stable without friction: there is nothing to compare with.
+    """
+    bare = replace(design, friction=replace(design.friction, load_coefficient=0.0))
+    if settling_ticks_of(bare, LEFT) == math.inf:
+        return None
     ticks = max(PERIOD_SETTLINGS * settling_ticks, LEAST_TICKS)
     every = design.controller.position_loop.every
     ticks = 4 * every * round(ticks / (4 * every))

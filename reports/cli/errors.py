@@ -66,16 +66,13 @@ def _run(call: Callable[[], object], options: Callable[[], Mapping[str, str]]) -
     try:
         status = call()
         sys.stdout.flush()
-    except UnstableError as error:
-        return _say(str(error), VERDICT_FAILED)
-    except Mistakes as error:
-        return max(_say(str(one), BAD_INPUT) for one in error.mistakes)
     except InputError as error:
-        return _say(_by_option(error, options), BAD_INPUT)
-    except NumericalError as error:
-        return _say(f"numerical failure: {error}", NO_RESULT)
-    except OutOfTime as error:
-        return _say(str(error), NO_RESULT)
+        if isinstance(error, Mistakes):
+            return max(_say(str(one), BAD_INPUT) for one in error.mistakes)
+        unstable = isinstance(error, UnstableError)
+        return _say(str(error), VERDICT_FAILED) if unstable else _say(_by_option(error, options), BAD_INPUT)
+    except (NumericalError, OutOfTime) as error:
+        return _say(f"{'numerical failure: ' * isinstance(error, NumericalError)}{error}", NO_RESULT)
     except BrokenPipeError:
         return _quiet_pipe()
     except SystemExit as leaving:

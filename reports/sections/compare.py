@@ -69,9 +69,7 @@ def data(comparison: Comparison) -> Tree:
     return {name: as_json(getattr(comparison, name)) for name in kept}
 
 
-def write(comparison: Comparison, folder: Path | None) -> list[str]:
-    if folder is None:
-        return []
+def write(comparison: Comparison, folder: Path) -> list[str]:
     write_text(folder / compare_best.TABLE, compare_best.table_text(comparison))
     return [str(folder / compare_best.TABLE)]
 

@@ -16,7 +16,7 @@ from reports import document as doc
 from reports.nightly.text import csv_text
 from reports.numbers import significant
 from reports.sections.names import LOOPS
-from reports.sections.requirements import item, label, limit_words
+from reports.sections.requirements import item, label, limit_words, nearer_limit
 
 SEEN = 5e-5  # relative; a smaller difference changes no digit that is shown
 _MOST = 3
@@ -54,13 +54,12 @@ def nearness(verdict: RequirementVerdict) -> float | None:
 
     Minus infinity for a figure of a loop that is not stable: it is not met, and there is none.
     """
-    of = verdict.requirement
-    if verdict.value is None and verdict.verdict == Verdict.NOT_MET:
+    value, distance, (limit, _) = verdict.value, verdict.distance, nearer_limit(verdict)
+    if value is None and verdict.verdict == Verdict.NOT_MET:
         return -math.inf
-    limits = [limit for limit in (of.minimum, of.maximum) if limit]
-    if verdict.value is None or verdict.distance is None or not math.isfinite(verdict.distance) or not limits:
+    if value is None or distance is None or not math.isfinite(distance) or not limit:
         return None
-    return reserve(of.quantity, verdict.value, min(limits, key=abs), verdict.distance)
+    return reserve(verdict.requirement.quantity, value, limit, distance)
 
 
 def weakest(one: Compared) -> tuple[float, RequirementVerdict | None]:

@@ -13,6 +13,7 @@ from reports import document as doc
 from reports.charts import style
 from reports.sections.loop_charts import both
 from reports.sections.names import LOOPS, in_shown
+from reports.sections.requirements import nearer_limit
 
 MOST_CURVES = 7
 MOST_BARS = 10
@@ -111,7 +112,7 @@ def _wanted(comparison: Comparison) -> dict[str, float | None]:
         loads = dict(drive_cases([r.load_Nm or 0.0]))
         key = f"{place}.{r.quantity}" + (f"@{loads[r.quantity]:g}" if place == "drive" else "")
         if key in comparison.sensitivities.base and comparison.base.figures.get(key) is not None:
-            result[key] = r.bound
+            result[key], _ = nearer_limit(verdict)
     if not result:
         margins = ("gain_margin", "phase_margin", "bandwidth")
         every = (f"{loop}.{q}" for loop in comparison.base.loops for q in margins)

@@ -99,6 +99,8 @@ def _threshold_table(result: FrictionEffects, fine: Unit, load: str) -> doc.Bloc
         note = _without(result.design)
     elif not all(point.threshold for point in result.points):
         note += " A load without figures gives a forward step no threshold."
+    if any(point.threshold and not point.hysteresis for point in result.points):
+        note += " Nothing is lost against the drive without friction, as that is not stable."
     if result.design.command != Command():
         note += " Steps as they come behind the profile and filter of the command."
     title = "Threshold of motion, and motion lost at a reversal of the command"

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from itertools import pairwise
+from operator import itemgetter
 from typing import Any
 
 import numpy as np
@@ -29,13 +29,13 @@ def section(design: Design, onset: Onset) -> doc.Section:
     )
     rows = _rows(design, onset, scale)
     columns = [
-        doc.of("amplitude", "amplitude", "Command amplitude", unit, format="short:3"),
-        doc.of("fraction", "fraction", "Of full deflection", "%", scale=100.0, format="fix:0"),
-        doc.of("hz", "hz", "Linear up to", "Hz", format="sig:3"),
-        doc.of("limiter", "limiter", "Then limited by"),
+        doc.column("amplitude", "Command amplitude", unit, format="short:3"),
+        doc.column("fraction", "Of full deflection", "%", format="fix:0"),
+        doc.column("hz", "Linear up to", "Hz", format="sig:3"),
+        doc.column("limiter", "Then limited by"),
     ]
     blocks = [doc.figure("onset", _chart(design, onset, scale, unit), caption)]
-    blocks += [doc.listing("How far the linear model reaches", rows, columns)] if rows else []
+    blocks += [doc.table("How far the linear model reaches", columns, rows)] if rows else []
     intro = "A linear prediction ends where a limit is reached. Which one, and when, depends on frequency."
     words = _result(rows, onset, scale, unit)
     title = "Validity of the linear model"
@@ -66,16 +66,19 @@ def _full(design: Design) -> float:
     return design.validation.full_deflection_rad if design.controller.position is not None else 0.0
 
 
-def _result(rows: Sequence[_Linear], onset: Onset, scale: float, unit: str) -> str:
+def _result(rows: Sequence[_Row], onset: Onset, scale: float, unit: str) -> str:
     if rows:
-        row = max(rows, key=lambda row: row.amplitude)
-        part = f"{100.0 * row.fraction:.0f} % of " * (row.fraction != 1.0) + "full deflection"
-        size = f"A sine of {part} ({row.amplitude:.3g} {unit})"
-        if row.hz == 0.0:
-            return f"{size} is linear at no frequency looked at: the {_noun(row.limiter)} acts."
-        if row.hz is None:
+        amplitude, percent, hz, limiter = max(rows, key=itemgetter(0))
+        part = f"{percent:.0f} % of " * (percent != 100.0) + "full deflection"
+        size = f"A sine of {part} ({amplitude:.3g} {unit})"
+        if hz is None:
             return f"{size} stays linear over the whole frequency range."
-        return f"{size} stays linear up to {row.hz:.3g} Hz; above, the {_noun(row.limiter)} acts."
+        reach = (
+            f"stays linear up to {hz:.3g} Hz; above, the"
+            if hz
+            else "is linear at no frequency looked at: the"
+        )
+        return f"{size} {reach} {_noun(limiter)} acts."
     if not np.isfinite(onset.amplitude_rad).any():
         return "No limit is reached by a sine command over the whole frequency range."
     k = int(np.argmin(onset.amplitude_rad))
@@ -94,23 +97,18 @@ def words_of(limiter: str) -> str:
     return COGGING if limiter == "cogging" else LIMITERS[limiter].words if limiter else "none"
 
 
-@dataclass(frozen=True)
-class _Linear:
-    amplitude: float
-    fraction: float
-    hz: float | None
-    limiter: str
+_Row = tuple[float, float, float | None, str]  # amplitude, % of full deflection, linear up to (Hz), limiter
 
 
-def _rows(design: Design, onset: Onset, scale: float) -> list[_Linear]:
-    rows: list[_Linear] = []
+def _rows(design: Design, onset: Onset, scale: float) -> list[_Row]:
+    rows: list[_Row] = []
     for fraction in design.validation.amplitude_fractions if _full(design) else ():
         amplitude, up_to, limiter = fraction * _full(design), None, "none in this range"
         reached = np.nonzero(onset.amplitude_rad < amplitude)[0]
         if len(reached):
             up_to = hertz(_crossing(onset, int(reached[0]), amplitude)) if reached[0] else 0.0
             limiter = words_of(onset.active[int(reached[0])])
-        rows.append(_Linear(amplitude * scale, fraction, up_to, limiter))
+        rows.append((amplitude * scale, 100.0 * fraction, up_to, limiter))
     return rows
 
 

@@ -50,7 +50,7 @@ def table(verdicts: Sequence[RequirementVerdict], title: str = "Requirements") -
 
 def item(verdict: RequirementVerdict) -> doc.VerdictItem:
     requirement = verdict.requirement
-    limit, comparison = _limit(verdict)
+    limit, comparison = nearer_limit(verdict)
     unlimited = "unlimited" * (verdict.value is not None and math.isinf(verdict.value))
     source, note = requirement.source, requirement.note
     source += f" ({note})" if note and note != source else ""
@@ -74,7 +74,7 @@ def limit_words(of: Requirement | Odds) -> str:
     return f"{' and '.join(parts)} {unit}".rstrip()
 
 
-def _limit(verdict: RequirementVerdict) -> tuple[float | None, str]:
+def nearer_limit(verdict: RequirementVerdict) -> tuple[float | None, str]:
     low, high = verdict.requirement.minimum, verdict.requirement.maximum
     if low is None:
         return high, "<="

@@ -29,8 +29,8 @@ def section(result: TuningResult) -> doc.Section:
     return doc.section("tuning", title, blocks, result=summary(result), status=result.verdict.role())
 
 
-def write(result: TuningResult, folder: Path | None) -> list[str]:
-    if folder is None or not result.feasible:
+def write(result: TuningResult, folder: Path) -> list[str]:
+    if not result.feasible:
         return []
     write_text(folder / "tuned.toml", write_changed(result.before, result.design))
     return [str(folder / "tuned.toml")]

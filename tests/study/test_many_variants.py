@@ -11,6 +11,7 @@ import pytest
 from actuator_lti import load_design
 from actuator_lti.asked.verdict import Verdict
 from actuator_lti.design import with_overrides, write_design
+from actuator_lti.design.model import Requirement
 from analyses.comparison.variants import Comparison, compare
 from analyses.slugs import slug
 from analyses.specification.requirements import RequirementVerdict
@@ -18,9 +19,11 @@ from analyses.specification.sensitivity import moved as moved_designs
 from analyses.specification.sensitivity import population_figures
 from analyses.studies.study import Variant, study_of
 from reports import document as doc
+from reports.charts.data import chart_of
 from reports.sections.compare import brief
 from reports.sections.compare import section as sections
 from reports.sections.compare_best import MANY, choice, nearness, table_text
+from reports.sections.compare_figures import tornadoes
 from reports.terminal import print_blocks
 from reports.verdict_summary import verdict_of
 
@@ -101,6 +104,26 @@ def test_the_table_has_every_figure_of_every_design(many) -> None:
     failing = next(row for row in rows if row["design"] == FAILING)
     assert (failing["not_met"], failing["not_proven"]) == ("1", "0")
     assert float(failing["room_percent"]) < 0.0
+
+
+@pytest.mark.parametrize(("value", "share"), [(99.0, 0.01), (10.5, 0.05)])
+def test_what_is_left_is_a_share_of_the_nearer_of_two_limits(value: float, share: float) -> None:
+    """Of 10 to 100 Hz: 1 Hz of 100, 0.5 Hz of 10."""
+    limits = {"unit": "Hz", "minimum": 10.0, "maximum": 100.0}
+    of = Requirement(id="b", quantity="bandwidth", loop="position", **limits)
+    about = {"value": value, "distance": of.distance(value), "verdict": Verdict.MET}
+    one = RequirementVerdict(id="b", requirement=of, loop="position", **about)
+    assert nearness(one) == pytest.approx(share)
+
+
+def test_a_tornado_shows_the_nearer_of_two_limits() -> None:
+    """The bandwidth is 27.3 Hz; a limit far off is not drawn."""
+    limits = {"unit": "Hz", "minimum": 1.0, "maximum": 30.0}
+    of = Requirement(id="b", quantity="bandwidth", loop="position", **limits)
+    found = compare(study_of(replace(load_design("ilr33-amber"), requirements=(of,))))
+    (drawn,) = doc.figures({"sections": [tornadoes(found)]})
+    (panel,) = chart_of(drawn["chart"]).columns[0].panels
+    assert [one.at for one in panel.items if getattr(one, "words", "") == "limit"] == [30.0]
 
 
 UNSTABLE = """

@@ -118,6 +118,25 @@ def test_what_a_reversal_loses_is_predicted(name, load_Nm, expected, within):
     assert loop.lost_motion_rad == pytest.approx(loop.predicted_rad, rel=within, abs=rounding)
 
 
+def test_a_drive_that_is_not_stable_without_friction_has_nothing_to_compare_with():
+    """A heavy load on an output sensor, damped by friction by load; a swing of 38 deg was said to be lost."""
+    design = load_design("ilr33-amber-compliant")
+    heavy = {"load.inertia": 300.0 * design.load.inertia_kgm2, "control.position.gain": 60.0}
+    rough = {
+        "coupling.stiffness": 3000.0,
+        "friction.load_coefficient": 100.0 * design.friction.load_coefficient,
+    }
+    design = with_values(design, {**heavy, **rough}, check=False)
+    position = replace(design.controller.position, sensor="output")
+    found = friction_effects(replace(design, controller=replace(design.controller, position=position)))
+    assert any(point.threshold for point in found.points)
+    assert all(point.hysteresis is None for point in found.points)
+    (table,) = (
+        block for block in section(found)["blocks"] if block.get("caption", "").startswith("Threshold")
+    )
+    assert "as that is not stable" in table["note"]
+
+
 @pytest.mark.parametrize(("design", "T", "U"), [
     *((with_values(AMBER, {"control.velocity.integral_time": T}), T, math.inf) for T in (0.5, 4.0, 1e3)),
     *((extruder(U, T), T, U) for T, U in ((10.0, 100.0), (10.0, 0.4))),

@@ -12,7 +12,7 @@ from scipy.signal import lfilter
 
 from actuator_lti import load_design
 from actuator_lti.asked.verdict import Verdict
-from actuator_lti.design import with_overrides, with_values
+from actuator_lti.design import shipped_designs, with_overrides, with_values
 from actuator_lti.drive.steady import motor_torque_Nm
 from analyses.duty import Asked, duty
 from analyses.duty.run import MOST_WORK, heating
@@ -46,11 +46,14 @@ def amber() -> Specification:
     return specification(AMBER)
 
 
-@pytest.mark.parametrize("name", SHIPPED)
+@pytest.mark.parametrize("name", shipped_designs())
 def test_the_simulated_rate_is_that_of_the_closed_form(name: str) -> None:
-    for one in specification(load_design(name)).capabilities:
+    """Against the load, also behind a coupling and a self-locking gear; no overload protection ends it."""
+    design = load_design(name)
+    for one in specification(design).capabilities:
         assert one.simulated_rate_rad_s == pytest.approx(one.figures.output_rate_rad_s, rel=1e-6)
-        assert 0.7 < one.simulated_acceleration_rad_s2 / one.figures.acceleration_rad_s2 <= 1.0 + 1e-9
+        if design.coupling is None:  # the motor's end of a spring swings
+            assert 0.7 < one.simulated_acceleration_rad_s2 / one.figures.acceleration_rad_s2 <= 1.0 + 1e-9
         if one.figures.motor_current_A is not None:
             assert one.simulated_current_A == pytest.approx(one.figures.motor_current_A, rel=1e-6)
 
