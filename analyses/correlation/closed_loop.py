@@ -19,7 +19,7 @@ from analyses.records.consistency import check_record
 from analyses.records.differentiation import filtered_motion, lowest_cutoff_hz
 from analyses.records.finding import Finding, because
 from analyses.records.inputs import InputUse, account, lacking
-from analyses.records.naming import KNOWN_UNITS, LOADS
+from analyses.records.naming import KNOWN_UNITS, LOADS, PLACES
 from analyses.records.record import Record, period_of, prepared
 from nonlinear import State, Trajectory, commands, simulate
 
@@ -30,7 +30,7 @@ AXIS_SIGNALS = {
 """What a record of an axis may hold that the model has too."""
 VELOCITY_CUTOFF_HZ = 100.0
 FIRST_ROWS = 50
-ANSWERS = ("angle", "output_angle", "position", "speed", "velocity", "current", "force")
+ANSWERS = (*PLACES, "speed", "velocity", "current", "force")
 """What tells when a step of the command acted, the surest first."""
 STEP_ROUNDS = 6
 
@@ -154,7 +154,7 @@ def _as_measured(
     """The signals of a run that are measured; a rate is taken from the place as that of the record is."""
     modelled = {name: series[name] for name in measured}
     for rate in {"speed", "velocity"} & measured.keys() - record.signals.keys():
-        place = next(name for name in ("angle", "output_angle", "position") if name in measured)
+        place = next(name for name in PLACES if name in measured)
         modelled[rate] = _rate_of(design, place, modelled[place], record.period_s)[0]
     return modelled
 

@@ -16,7 +16,7 @@ from actuator_lti.errors import InputError
 from actuator_lti.types import Floats, Ints
 from analyses.records.holds import Hold, hold_of
 from analyses.records.inputs import lacking
-from analyses.records.naming import LOADS
+from analyses.records.naming import LOADS, PLACES
 from analyses.records.record import HELD, SMOOTH, STRAIGHT, Record
 from nonlinear import State, commands, loads
 from nonlinear.loads import LoadTorque
@@ -262,7 +262,7 @@ def first_states(driven: Driven, record: Record, measured: Mapping[str, Floats])
     """
     design = driven.design
     ratio, motor = design.total_ratio, design.effective_motor
-    place = next((name for name in ("angle", "output_angle", "position") if name in measured), None)
+    place = next((name for name in PLACES if name in measured), None)
     first = float(measured[place][0]) if place else 0.0
     rest = State(motor_angle_rad=first if place == "angle" else ratio * first)
     speed = 0.0

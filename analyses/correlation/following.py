@@ -13,10 +13,9 @@ from analyses.correlation.driving import Driven, command_of
 from analyses.estimation.least_squares import identifiable, solve
 from analyses.records.compared import COSINE, ratio_of
 from analyses.records.finding import OVER, RATE_TOLERANCE, SURE, Finding
-from analyses.records.naming import KNOWN_UNITS
+from analyses.records.naming import KNOWN_UNITS, PLACES
 from analyses.records.record import Record
 
-PLACES = ("angle", "output_angle", "position")
 LIMITED = {"current": "limits.peak_current", "speed": "limits.speed", "velocity": "limits.speed"}
 
 

@@ -57,12 +57,12 @@ class CampaignResult:
     @property
     def rows_in(self) -> int:
         """Data rows in the files of the runs that are used."""
-        return self.imported.rows_in
+        return sum(counts.rows_in for counts in self.imported.counts)
 
     @property
     def rows_out(self) -> int:
         """Rows that were kept of them."""
-        return self.imported.rows_out
+        return sum(counts.rows_out for counts in self.imported.counts)
 
     @property
     def inputs(self) -> tuple[InputUse, ...]:

@@ -9,7 +9,7 @@ from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError, NumericalError
 from actuator_lti.types import Floats, Mask
 from analyses.correlation.closed_loop import with_zero
-from analyses.correlation.following import PLACES, Followed, followed
+from analyses.correlation.following import Followed, followed
 from analyses.estimation.least_squares import correlated_covariance, identifiable, solve
 from analyses.estimation.parameters import Parameter, parameter
 from analyses.estimation.series import correlation_time
@@ -28,7 +28,7 @@ from analyses.identification.rows import (
 )
 from analyses.records.compared import COSINE
 from analyses.records.finding import SURE, Finding
-from analyses.records.naming import KNOWN_UNITS, RATES
+from analyses.records.naming import KNOWN_UNITS, PLACES, RATES
 from analyses.records.rate import clock_doubt
 from analyses.records.record import Record, lasting
 from analyses.records.voltage import resistance_doubt
@@ -230,27 +230,20 @@ def without_flat_tops(start: Design, record: Record, recipe: Recipe | None) -> t
     return without, [Finding(subject=f"{name} without flat tops", passed=None, text=text, done="left out")]
 
 
-def shifted(design: Design, record: Record, seconds: float) -> Record:
-    """A record with its drive signal taken ``seconds`` later in the file, as if it came so much earlier."""
-    name = drive_of(design, record)[1]
-    moved = np.interp(record.time_s + seconds, record.time_s, record[name])
-    return replace(record, signals={**record.signals, name: moved})
-
-
-def moved(design: Design, record: Record, seconds: float) -> Record:
-    """A record with its motion taken ``seconds`` later in the file."""
-    times, motions = record.time_s + seconds, (*PLACES, RATES[design.axis])
-    taken = {n: np.interp(times, record.time_s, record[n]) for n in motions if n in record.signals}
+def shifted(record: Record, seconds: float, *names: str) -> Record:
+    """A record with some signals taken ``seconds`` later in the file, as if they came so much earlier."""
+    times, there = record.time_s + seconds, [name for name in names if name in record.signals]
+    taken = {name: np.interp(times, record.time_s, record[name]) for name in there}
     return replace(record, signals={**record.signals, **taken})
 
 
 def in_time(design: Design, record: Record, like: Record, late_s: float) -> Record:
     """A record with its drive signal earlier by so much, or its motion later: as a simulated one has both."""
-    ways = shifted(design, record, late_s), moved(design, record, -late_s)
-    names_of_all = (*PLACES, RATES[design.axis], drive_of(design, record)[1])
+    motion, drive = (*PLACES, RATES[design.axis]), drive_of(design, record)[1]
+    ways = shifted(record, late_s, drive), shifted(record, -late_s, *motion)
 
     def off(one: Record) -> float:
-        names = [n for n in names_of_all if n in one.signals and n in like.signals]
+        names = [n for n in (*motion, drive) if n in one.signals and n in like.signals]
         misses = {name: one[name][: len(like)] - like[name] for name in names}
         return sum(float(np.var(each)) / max(float(np.var(like[n])), 1e-300) for n, each in misses.items())
 
@@ -265,11 +258,12 @@ def lag_of(design: Design, record: Record, simulated: Record, model: JointModel)
     noise of motion and current does not bias the steps. None where the motion does not tell a lag from
     inertia and friction.
     """
+    drive = drive_of(design, record)[1]
 
     def slopes(record: Record, rows: Rows, driven: Callable[[Record], Floats]) -> Floats:
         """Columns of the model, and by how much the drive of each row falls with a shift, N m/s."""
         half = 0.5 * record.period_s
-        late, early = (driven(shifted(design, record, s)) for s in (half, -half))
+        late, early = (driven(shifted(record, s, drive)) for s in (half, -half))
         return np.column_stack([rows.columns(model.names), (early - late) / (2.0 * half)])
 
     try:
@@ -283,7 +277,7 @@ def lag_of(design: Design, record: Record, simulated: Record, model: JointModel)
         lag, error, driven = 0.0, np.inf, driven_rows(design, record, own)
         known = driven(record) - own.y + model.kept(own)
         for _ in range(ROUNDS):
-            late = shifted(design, record, lag)
+            late = shifted(record, lag, drive)
             y, table = (own.at(both, one) for one in (driven(late) - known, slopes(late, own, driven)))
             step, error = _step(z, table, y)
             lag += float(np.clip(step, -LARGEST_STEP_S, LARGEST_STEP_S))
@@ -307,8 +301,8 @@ def _bend(design: Design, record: Record, model: JointModel, own: Rows) -> tuple
 
     Of what does not turn with the direction: the instants of reversal are those of the lag.
     """
-    step = record.period_s
-    late, early = (rows_under(design, moved(design, record, s), model) for s in (step, -step))
+    step, motion = record.period_s, (*PLACES, RATES[design.axis])
+    late, early = (rows_under(design, shifted(record, s, *motion), model) for s in (step, -step))
     shared, names = own.keep & late.keep & early.keep, [n for n in model.names if not n.startswith(TURNS)]
     after, before, here = (one.at(shared, one.explained(model, names)) for one in (late, early, own))
     return shared, 0.5 * (2.0 * here - before - after) / step**2

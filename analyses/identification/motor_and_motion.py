@@ -31,7 +31,7 @@ from analyses.identification.joint_model import NAMES, FrictionForm, JointModel,
 from analyses.identification.motion_noise import with_noise_of_motion
 from analyses.identification.own_bias import holds_between, without_bias
 from analyses.identification.run_down import fit_run_downs, runs_down
-from analyses.records.record import HELD, SMOOTH, Record
+from analyses.records.record import HELD, SMOOTH, STRAIGHT, Record
 from analyses.records.voltage import resistance_doubt
 
 Both = tuple[Sequence[Record], Sequence[Record]]  # records as taken, and simulated
@@ -83,7 +83,7 @@ class Sought:
         plain, settings = self.plain, self.settings
         commands = [(command_of(plain, record), record) for record in records]
         read = {between for own, record in commands for between in self._ways(own, record)}
-        betweens = sorted(read, key=HELD.__eq__)
+        betweens = sorted(read, key=(SMOOTH, STRAIGHT, HELD).index)  # of equals the first is taken
         ways = [[replace(one, between=way) for one in records] for way in betweens]
         moves = {own.stage for own, _ in commands if own} <= {"position", "velocity"}
         simulated = moves and settings.electrical and settings.friction != "map" and not self.gravity

@@ -20,6 +20,7 @@ from analyses.estimation.parameters import default_value
 from analyses.identification.joint_model import FrictionForm
 from analyses.identification.rows import record_rows
 from analyses.identification.run_down import decay_of, runs_down
+from analyses.records.naming import PLACES
 from analyses.records.record import Record
 
 STEP = 1e-3
@@ -31,7 +32,7 @@ LEAST_STEPPED = 0.1  # of the start: below, a value, which may go to zero, is no
 LEAST_LOAD = 1e-6  # part of its start that is left of an inertia behind a coupling
 MOST_TICKS = 2_000_000
 DRIVE_SIGNALS = ("force", "current", "voltage")
-MOTION_SIGNALS = ("speed", "velocity", "angle", "output_angle", "position")
+MOTION_SIGNALS = ("speed", "velocity", *PLACES)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -20,13 +20,13 @@ from analyses.identification.inverse import fit_records, with_scatter
 from analyses.identification.joint_model import JointModel, RecordFit
 from analyses.identification.output_error import simulated_part
 from analyses.identification.rows import is_benchmark, motion_of, recipe_for
+from analyses.records.naming import PLACES, REFERENCES
 from analyses.records.record import SMOOTH, Record
 from analyses.records.single_rows import ROUNDING, count_of
 
 LARGEST_BIAS = 0.2
 ROUNDS_BY_LOOPS, ROUNDS_BY_GAIN = 12, 6
 ROUNDS = 3
-PLACES = {"angle", "output_angle", "position"}
 SETTLED = 0.1  # standard errors within which a bias that was found again is the one that was found before
 
 
@@ -210,7 +210,6 @@ def _driven(design: Design, record: Record) -> Record:
     record = simulated_part(design, record)
     if command_of(design, record) is not None:
         return record
-    name = "position_reference" if design.axis == "linear" else "reference"
 
     def place(record: Record) -> Floats:  # as recorded, whatever cut-off the fit has
         return motion_of(design, record, recipe_for(record))[0].position
@@ -220,7 +219,7 @@ def _driven(design: Design, record: Record) -> Record:
     step = (_by_loops if holds else _by_gain)(design, record.period_s, len(wanted))
     driven, nearest = record, np.inf
     for _ in range(ROUNDS_BY_LOOPS if holds else ROUNDS_BY_GAIN):
-        signals = {**record.signals, name: command / design.total_ratio}
+        signals = {**record.signals, REFERENCES[design.axis]: command / design.total_ratio}
         tried = replace(record, signals=signals, between=record.between or SMOOTH)
         off = wanted - place(with_model_signals(design, tried))
         size = float(off @ off)
@@ -254,7 +253,7 @@ def with_model_signals(design: Design, record: Record) -> Record:
     """The record as the design would have made it: every signal that the model has is the model's."""
     names = [name for name in AXIS_SIGNALS[design.axis] if name in record.signals]
     signals = model_signals(design, record, {name: record[name] for name in names})
-    signals |= {n: in_counts(signals[n], record[n]) for n in PLACES & signals.keys()}
+    signals |= {n: in_counts(signals[n], record[n]) for n in signals.keys() & set(PLACES)}
     return replace(record, signals={**record.signals, **signals})
 
 

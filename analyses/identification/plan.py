@@ -16,6 +16,7 @@ from analyses.estimation.least_squares import Information, covariance_of, identi
 from analyses.estimation.parameters import default_value
 from analyses.identification.joint_model import JointModel, Rows
 from analyses.identification.rows import record_rows
+from analyses.records.naming import REFERENCES
 from analyses.records.record import Record, RowCounts
 
 SEGMENT_S = 4.0
@@ -159,7 +160,7 @@ def _largest(design: Design, shape: str, cycles: int) -> tuple[Floats, Record]:
     rate = float(np.max(np.abs(np.gradient(wave, PERIOD_S)))) * design.total_ratio
     amplitude = USED * min(design.validation.full_deflection_rad, reachable_speed(design) / rate)
     own, name = design.limits, _drive(design)
-    wanted, place = ("position_reference", "position") if design.axis == "linear" else ("reference", "angle")
+    wanted, place = REFERENCES[design.axis], "position" if design.axis == "linear" else "angle"
     blank = dict.fromkeys((place, name), np.zeros(len(time)))
     for _ in range(24):
         asked = {wanted: amplitude * wave, **blank}

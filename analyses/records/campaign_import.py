@@ -60,14 +60,9 @@ class ImportedCampaign:
     set_aside: tuple[SetAside, ...]
 
     @property
-    def rows_in(self) -> int:
-        """Data rows in the files of the runs that are used."""
-        return sum(counts.rows_in for counts in self._counts())
-
-    @property
-    def rows_out(self) -> int:
-        """Rows that were kept of them."""
-        return sum(counts.rows_out for counts in self._counts())
+    def counts(self) -> list[RowCounts]:
+        """The account of each file of the runs that are used."""
+        return [read.counts for run in self.runs for read in (run.record, run.sensor) if read is not None]
 
     @property
     def inputs(self) -> tuple[InputUse, ...]:
@@ -81,9 +76,6 @@ class ImportedCampaign:
                     key = (file, one.column)
                     whole[key] = _over(replace(one, file=file), whole.get(key))
         return tuple(whole.values())
-
-    def _counts(self) -> list[RowCounts]:
-        return [read.counts for run in self.runs for read in (run.record, run.sensor) if read is not None]
 
 
 def _over(one: InputUse, known: InputUse | None) -> InputUse:

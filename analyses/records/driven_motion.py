@@ -10,7 +10,7 @@ from analyses.estimation.parameters import own_share
 from analyses.records.compared import COSINE, place_of, ratio_of, smooth
 from analyses.records.factors import NEAR, named_factor
 from analyses.records.finding import SURE, Finding
-from analyses.records.naming import LOADS, RATES
+from analyses.records.naming import LOADS, RATES, REFERENCES
 from analyses.records.record import Record
 
 TIMES = (60.0, 1e3, 1e6)  # min, ms and us read as s
@@ -26,7 +26,7 @@ def _by_lag(design: Design, record: Record) -> Finding | None:
 
     Behind a position loop over a velocity loop the motion is later by 1/Kv, whatever the motor.
     """
-    control, command = design.controller, "position_reference" if design.axis == "linear" else "reference"
+    control, command = design.controller, REFERENCES[design.axis]
     loop, place = control.position, place_of(design, record)
     if place is None or loop is None or control.velocity is None or command not in record.signals:
         return None

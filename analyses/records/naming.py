@@ -58,8 +58,10 @@ SIGNALS = (
 
 KNOWN_UNITS = {"time": "s"} | {signal.name: signal.unit for signal in SIGNALS}
 MEANINGS = {signal.name: signal.meaning for signal in SIGNALS}
+PLACES = ("angle", "output_angle", "position")
 RATES = {"rotary": "speed", "linear": "velocity"}  # of the motor, by the axis
 LOADS = {"rotary": "torque", "linear": "load_force"}
+REFERENCES = {"rotary": "reference", "linear": "position_reference"}  # of the output's place
 TIME_NAMES = ("time", "t", "timestamp", "elapsed", "time_stamp")
 NOT_NEEDED = {"motor_angle": "m", "motor_position": "m"}
 """A trajectory of a linear axis holds its position twice."""

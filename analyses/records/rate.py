@@ -10,7 +10,7 @@ from actuator_lti.types import Floats, Mask
 from analyses.records.compared import COSINE, LEAST_ROWS, bounds, place_of, ratio_of, smooth, thinned
 from analyses.records.factors import with_factor
 from analyses.records.finding import RATE_TOLERANCE, SURE, Finding
-from analyses.records.naming import KNOWN_UNITS, RATES
+from analyses.records.naming import KNOWN_UNITS, PLACES, RATES
 from analyses.records.record import HELD, Record
 
 TICK_TOLERANCE = 1e-3
@@ -67,7 +67,7 @@ def rate_finding(ratio: RateRatio | None, design: Design, record: Record) -> Fin
     subject, off = f"{name} against the rate of the {ratio.place}", ratio.found - 1.0
     if abs(ratio.cosine) < COSINE:
         why = f"they are not alike (cosine {ratio.cosine:.2f})"
-        rest = [other for other in record.signals if other not in (name, "angle", "output_angle", "position")]
+        rest = [other for other in record.signals if other not in (name, *PLACES)]
         likes = {other: smooth(record, record[other][1:])[ratio.moves] for other in rest}
         swapped = (n for n, one in likes.items() if abs(ratio_of(one, ratio.rate[ratio.moves])[1]) > 0.97)
         if other := next(swapped, ""):

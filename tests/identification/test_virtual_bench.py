@@ -100,7 +100,7 @@ def test_files_give_true_values_clocks_and_law(from_files: CampaignResult, runs:
     assert [run.id for run in from_files.set_aside] == ["17"]
     assert 'run17_drive.csv:101: column "Current" = "oops"' in from_files.set_aside[0].reason
     assert len(from_files.fit.points) == 53
-    assert from_files.imported.rows_in == from_files.imported.rows_out > 53 * 2000
+    assert from_files.rows_in == from_files.rows_out > 53 * 2000
     logs, _ = measure_bench(runs, 11, INSTRUMENTS)
     true = {log.id: log.sensor_offset_s for log in logs}
     joined = [run for run in from_files.imported.runs if run.join is not None]
