@@ -40,9 +40,9 @@ class Solution:
 
 
 def identifiable(
-    w: Floats, names: Sequence[str], *, least: float = LEAST_OWN_SHARE
+    w: Floats, names: Sequence[str] = (), *, least: float = LEAST_OWN_SHARE
 ) -> tuple[tuple[int, ...], tuple[NotIdentified, ...]]:
-    """Which columns can be told apart (a share above ``least`` their own), the first named first.
+    """Which columns can be told apart (a share above ``least`` their own), the first before others.
 
     >>> w = np.column_stack([np.arange(4.0), np.ones(4), np.ones(4), np.zeros(4)])
     >>> kept, left = identifiable(w, ("viscous", "dry", "offset", "load"))
@@ -52,6 +52,7 @@ def identifiable(
     kept: list[int] = []
     basis: list[Floats] = []
     left = []
+    names = names or [""] * w.shape[1]
     for k, name in enumerate(names):
         size = float(np.linalg.norm(w[:, k]))
         unit = w[:, k] / (size or 1.0)
@@ -69,11 +70,6 @@ def identifiable(
             moves = {names[kept[j]]: float(share[j] * size / sizes[j]) for j in chosen}
         left.append(NotIdentified(name=name, moves=moves))
     return tuple(kept), tuple(left)
-
-
-def independent(w: Floats, *, least: float = LEAST_OWN_SHARE) -> list[int]:
-    """Which columns can be told apart, as `identifiable` without names."""
-    return list(identifiable(w, [""] * w.shape[1], least=least)[0])
 
 
 def solve(w: Floats, y: Floats, ends: Sequence[int] = ()) -> Solution:

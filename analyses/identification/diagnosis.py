@@ -10,7 +10,7 @@ from actuator_lti.errors import InputError, NumericalError
 from actuator_lti.types import Floats, Mask
 from analyses.correlation.closed_loop import with_zero
 from analyses.correlation.following import PLACES, Followed, followed
-from analyses.estimation.least_squares import covariance_of, identifiable, independent, information_of, solve
+from analyses.estimation.least_squares import correlated_covariance, identifiable, solve
 from analyses.estimation.parameters import Parameter, parameter
 from analyses.estimation.series import correlation_time
 from analyses.identification.friction_law import Bend, bend_of, kept_columns
@@ -176,9 +176,9 @@ def _drift(part: RecordFit, model: JointModel, offset: Parameter) -> tuple[list[
     moved = np.zeros_like(model.covariance)
     time, w = np.linspace(-1.0, 1.0, len(part.keep))[part.keep][part.compared], part.w[part.compared]
     every = np.column_stack([w, *(each[part.compared] for each in kept_columns(model, part))])
-    every = every[:, independent(every)]
+    every = every[:, identifiable(every)[0]]
     table = np.column_stack([every, time * (w @ model.values), time])
-    if len(table) <= table.shape[1] or len(independent(table)) < table.shape[1]:
+    if len(table) <= table.shape[1] or len(identifiable(table)[0]) < table.shape[1]:
         return [], moved
     found, changes = solve(table, part.noise), []
     scale, shift = found.values[-2:]
@@ -330,5 +330,5 @@ def _step(z: Floats, table: Floats, y: Floats) -> tuple[float, float]:
     found = np.linalg.solve(slopes, z.T @ y)
     # with rows z and the noise of the residual, the covariance of z'e, turned back by the slopes
     gram, back = z.T @ z, np.linalg.inv(slopes)
-    noise = gram @ covariance_of([information_of(z, y - table @ found)]) @ gram
+    noise = gram @ correlated_covariance(z, y - table @ found) @ gram
     return float(found[-1] / size[-1]), float(np.sqrt((back @ noise @ back.T)[-1, -1]) / size[-1])

@@ -13,7 +13,7 @@ from analyses.estimation.least_squares import (
     LEAST_OWN_SHARE,
     RESOLVED,
     event_blocks,
-    independent,
+    identifiable,
     scaled_lstsq,
     wider_covariance,
 )
@@ -163,7 +163,7 @@ def _term(model: JointModel, speed: float) -> Bend:
     # where the motion turns back is most of what a bend makes of the values
     moved = -scaled_lstsq((every := np.concatenate(fitted))[:, :-1], every[:, -1])
     # of the others all that differ: what a kept value is off by is no term
-    others = independent(np.concatenate(tables)[:, :-1], least=RESOLVED)
+    others, _ = identifiable(np.concatenate(tables)[:, :-1], least=RESOLVED)
     tables = [each[:, [*others, -1]] for each in tables]
     table = np.concatenate(tables)
     own = term - table[:, :-1] @ scaled_lstsq(table[:, :-1], term)

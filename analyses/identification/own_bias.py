@@ -14,13 +14,7 @@ from actuator_lti.types import Floats
 from analyses.correlation.closed_loop import AXIS_SIGNALS, model_signals
 from analyses.correlation.driving import command_of
 from analyses.estimation.fit import Fit
-from analyses.estimation.least_squares import (
-    covariance_of,
-    information_of,
-    scaled_lstsq,
-    solve,
-    wider_covariance,
-)
+from analyses.estimation.least_squares import correlated_covariance, scaled_lstsq, solve, wider_covariance
 from analyses.estimation.parameters import default_value
 from analyses.identification.inverse import fit_records, with_scatter
 from analyses.identification.joint_model import JointModel, RecordFit
@@ -190,8 +184,8 @@ def _alone(
     """One record fitted alone, less its bias, with the errors of its noise; ``true``: what was simulated."""
     both = tuple(name for name in own.names if name in simulated.names)
     values = np.array([own[name] - simulated[name] + true(name) for name in both])
-    information = information_of(weighed[0][:, [model.names.index(name) for name in both]], weighed[1])
-    return Fit(names=both, values=values, covariance=covariance_of([information]))
+    slopes = weighed[0][:, [model.names.index(name) for name in both]]
+    return Fit(names=both, values=values, covariance=correlated_covariance(slopes, weighed[1]))
 
 
 def _cannot(design: Design, records: Sequence[Record]) -> str:

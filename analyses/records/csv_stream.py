@@ -41,28 +41,14 @@ def read_csv_record(path: str | Path, spec: RecordSpec, *, max_rows: int = CSV_R
     stays bounded whatever its length; ``Record.averaged`` and a note tell. An InputError names the file, the
     line, the column and the reason.
     """
-    counts, rows = RowCounts(), BoundedRows(columns=1 + len(spec.signals), limit=max_rows)
-    digest = hashlib.sha256()
-    for chunk in stream_csv(path, spec, counts, digest):
-        rows.add(chunk)
-    return record_of_rows(rows.array(), spec, Path(path), counts, digest.hexdigest(), rows.factor)
-
-
-def stream_csv(
-    path: str | Path, spec: RecordSpec, counts: RowCounts | None = None, digest: hashlib._Hash | None = None
-) -> Iterator[Floats]:
-    """Yield blocks of rows, shape (n, 1 + signals): time in s, then each signal in SI.
-
-    Memory does not depend on the length of the file. ``counts`` is filled in on the way, ``digest`` fed with
-    the bytes that are read.
-    """
-    origin, counts = str(path), RowCounts() if counts is None else counts
+    origin, counts, digest = str(path), RowCounts(), hashlib.sha256()
+    rows = BoundedRows(columns=1 + len(spec.signals), limit=max_rows)
     in_si, file = SiRows(spec, counts, origin), _File(spec, counts, origin)
     with open_regular(Path(path), "CSV file") as stream:
-        for data in _line_blocks(stream, origin, digest or hashlib.sha256()):
-            block = file.block(data)
-            if block is not None and len(rows := in_si(block)):
-                yield rows
+        for data in _line_blocks(stream, origin, digest):
+            if (block := file.block(data)) is not None:
+                rows.add(in_si(block))
+    return record_of_rows(rows.array(), spec, Path(path), counts, digest.hexdigest(), rows.factor)
 
 
 @dataclass

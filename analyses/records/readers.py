@@ -1,7 +1,7 @@
 """Files of named columns (Parquet, JSON, MATLAB up to 7.2), and a record of any file by its ending."""
 
 import hashlib
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from io import BytesIO
 from pathlib import Path
@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from actuator_lti.bounds import CSV_COLUMNS, MAT_BYTES, TABLE_BYTES, TABLE_ROWS
+from actuator_lti.bounds import CSV_COLUMNS, MAT_BYTES, TABLE_BYTES, TABLE_ROWS, Bound
 from actuator_lti.errors import InputError, in_file
 from actuator_lti.files.matlab import MatContent, read_mat
 from actuator_lti.files.reading import decode, parse_json, read_bytes, shown_path
@@ -21,14 +21,12 @@ from analyses.records.spec import CsvFormat, RecordSpec
 from analyses.records.table_record import record_of_columns
 
 
-def load_parquet(path: Path) -> tuple[Mapping[str, Floats], str]:
-    """The columns of numbers by name, NaN where a value is missing, and the file's SHA-256."""
+def _parquet(data: bytes, where: str) -> Mapping[str, Floats]:
+    """The columns of numbers by name, NaN where a value is missing."""
     need("pyarrow", "tables", "a Parquet file")
     import pyarrow as pa
     import pyarrow.parquet as pq
 
-    where = shown_path(path)
-    data = read_bytes(path, "Parquet file", TABLE_BYTES)
     try:
         file = pq.ParquetFile(BytesIO(data))
         TABLE_ROWS.check(file.metadata.num_rows, where)
@@ -44,13 +42,11 @@ def load_parquet(path: Path) -> tuple[Mapping[str, Floats], str]:
             stamps = column.cast(pa.timestamp("ns")).to_numpy()
             since = (stamps - stamps[:1]) / np.timedelta64(1, "ns")
             result[f"{name} [s]"] = 1e-9 * np.asarray(since, dtype=np.float64)
-    return result, hashlib.sha256(data).hexdigest()
+    return result
 
 
-def load_json(path: Path) -> tuple[Mapping[str, Floats], str]:
-    """The columns of numbers by name (``group.name`` in groups), NaN for null, and the file's SHA-256."""
-    where = shown_path(path)
-    data = read_bytes(path, "JSON record", TABLE_BYTES)
+def _json(data: bytes, where: str) -> Mapping[str, Floats]:
+    """The columns of numbers by name (``group.name`` in groups), NaN for null."""
     tree = parse_json(decode(data, where), where)
     if isinstance(tree, list) and all(isinstance(row, dict) for row in tree):
         names = dict.fromkeys(name for row in tree for name in row)
@@ -58,7 +54,7 @@ def load_json(path: Path) -> tuple[Mapping[str, Floats], str]:
         tree = {name: [row.get(name) for row in tree] for name in names}
     if not isinstance(tree, dict):
         raise InputError("no record; allowed: columns by name, or a list of rows by name", where=where)
-    return dict(_columns(tree, "")), hashlib.sha256(data).hexdigest()
+    return dict(_columns(tree, ""))
 
 
 def _columns(tree: Mapping[str, Any], group: str) -> Iterator[tuple[str, Floats]]:
@@ -69,13 +65,12 @@ def _columns(tree: Mapping[str, Any], group: str) -> Iterator[tuple[str, Floats]
             yield group + name, np.array(value, dtype=np.float64)
 
 
-def load_mat(path: Path) -> tuple[MatContent, str]:
-    """The content of a file, without its empty arrays, and its SHA-256."""
-    data = read_bytes(path, ".mat file", MAT_BYTES)
-    with in_file(str(path)):
+def _mat(data: bytes, where: str) -> MatContent:
+    """The content of a file, without its empty arrays."""
+    with in_file(where):
         content = read_mat(data)
     content.arrays = {key: value for key, value in content.arrays.items() if value.size}
-    return content, hashlib.sha256(data).hexdigest()
+    return content
 
 
 def columns_of(content: MatContent, layout: CsvFormat, path: Path) -> Mapping[str, Floats]:
@@ -103,17 +98,22 @@ def names_in(content: MatContent, count: int) -> tuple[str, ...]:
     return tuple(lists[0]) if len(lists) == 1 else ()
 
 
-TABLES = {".parquet": load_parquet, ".pq": load_parquet, ".json": load_json}
-"""What gives the columns of a file by name, and its SHA-256, by its ending."""
-
-
+_WHOLE: Mapping[str, tuple[str, Bound, Callable[[bytes, str], MatContent | Mapping[str, Floats]]]] = {
+    ".mat": (".mat file", MAT_BYTES, _mat),
+    ".json": ("JSON record", TABLE_BYTES, _json),
+    **dict.fromkeys((".parquet", ".pq"), ("Parquet file", TABLE_BYTES, _parquet)),
+}
+"""Kinds of files that are read whole, by their ending: name, most bytes, reader."""
 Held = tuple[MatContent | Mapping[str, Floats], str] | None
 """What a file holds that is read whole, and its SHA-256; None of one that is read row by row."""
 
 
 def held_in(path: Path) -> Held:
-    suffix = path.suffix.lower()
-    return load_mat(path) if suffix == ".mat" else TABLES[suffix](path) if suffix in TABLES else None
+    if (kind := _WHOLE.get(path.suffix.lower())) is None:
+        return None
+    what, most, read = kind
+    data = read_bytes(path, what, most)
+    return read(data, shown_path(path)), hashlib.sha256(data).hexdigest()
 
 
 def read_record(path: Path, spec: RecordSpec, held: Held = None) -> Record:

@@ -11,9 +11,9 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from actuator_lti.bounds import CSV_COLUMNS, MAT_BYTES, TABLE_BYTES, TABLE_ROWS
+from actuator_lti.bounds import CSV_COLUMNS, TABLE_BYTES, TABLE_ROWS
 from actuator_lti.errors import InputError, in_file
-from actuator_lti.files.matlab import read_mat
+from actuator_lti.files.matlab import MatContent
 from actuator_lti.files.reading import UTF_16, read_bytes, shown, shown_path
 from actuator_lti.measured.response import (
     CONFIDENCE,
@@ -26,7 +26,7 @@ from actuator_lti.measured.response import (
 from actuator_lti.types import Compared, Floats
 from analyses.records import response_columns as column
 from analyses.records.csv_stream import text_of
-from analyses.records.readers import TABLES
+from analyses.records.readers import held_in
 
 Loop = Literal["L", "T", "S"]
 UNTITLED = ("f_hz", "gain_db", "phase_deg", "coherence")  # columns without a heading
@@ -117,20 +117,17 @@ def read_response(source: Path | str | Any, averages: int | None = None) -> Reco
     if not isinstance(source, (str, Path)):
         raise InputError(f"{shown(source)}: allowed: a path or control.FrequencyResponseData")
     with in_file(shown_path(source)):
-        titled, suffix = True, Path(source).suffix.lower()
-        if suffix == ".mat":
-            columns = _matlab(read_bytes(source, column.WHAT, MAT_BYTES))
-        elif suffix in TABLES:
-            columns = dict(TABLES[suffix](Path(source))[0])
-        else:
+        titled, held = True, held_in(Path(source))
+        if held is None:
             columns, titled = _table(read_bytes(source, column.WHAT, TABLE_BYTES))
+        else:
+            columns = _matlab(held[0]) if isinstance(held[0], MatContent) else dict(held[0])
         read = _response(columns, Path(source).name, averages)
         return read if titled else replace(read, read_as=f"without a heading, {read.read_as}")
 
 
-def _matlab(data: bytes) -> dict[str, Floats]:
+def _matlab(content: MatContent) -> dict[str, Floats]:
     """The arrays of a file, complex ones as both parts; of a structure's its text ``...Unit`` with it."""
-    content = read_mat(data)
     columns = {name: values.ravel() for name, values in content.arrays.items()}
     for name, values in content.complexes.items():
         columns |= {f"{name}.real": values.real.ravel(), f"{name}.imag": values.imag.ravel()}

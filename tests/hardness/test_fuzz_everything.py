@@ -23,7 +23,7 @@ from analyses.records.campaign_file import load_campaign
 from analyses.records.csv_stream import read_csv_record
 from analyses.records.differentiation import filtered_motion
 from analyses.records.open_record import open_record
-from analyses.records.readers import load_mat, read_record
+from analyses.records.readers import read_record
 from nonlinear import commands
 from tests import refusals
 
@@ -168,8 +168,7 @@ def test_integers_control_characters_and_keys_twice() -> None:
 
 KINDS: dict[str, Callable[[Path], object]] = {
     ".csv": lambda path: read_csv_record(path, SPEC),
-    ".mat": load_mat,
-    ".parquet": lambda path: read_record(path, SPEC),
+    **dict.fromkeys((".mat", ".parquet"), lambda path: read_record(path, SPEC)),
     ".toml": load_campaign,
     ".rec": open_record,
     ".cmd": lambda path: commands.recorded(path),
