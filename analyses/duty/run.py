@@ -193,9 +193,9 @@ def _cycle(design: Design, asked: Asked) -> tuple[Piece, Legs, Legs, bool]:
     """Steady motion, motion and rest of a cycle, and whether the motion is steady.
 
     That is where the slowest pole has fallen to `STEADY` and, with all that is not linear, the rms current of
-    as long again is the same; counts of a sensor let that of single periods differ for ever. The rest goes on from there, and the motion begins from the rest; one too
-    short to forget that is followed with its rest until the rms current of a cycle is the same again, or for
-    as long as the motion itself was.
+    as long again is the same; counts of a sensor let that of single periods differ for ever. The rest goes on
+    from there, and the motion begins from the rest; one too short to forget that is followed with its rest
+    until the rms current of a cycle is the same again, or for as long as the motion itself was.
     """
     Ts, size = design.controller.period_s, asked.size_of(design)
     every = round(design.controller.period_of(design.controller.outermost) / Ts)
