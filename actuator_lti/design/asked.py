@@ -105,6 +105,11 @@ class Requirement:
         """Its limit, the lower one where it has both."""
         return self.maximum if self.minimum is None else self.minimum
 
+    def nearer(self, value: float) -> float:
+        """Of its limits the one that a value is nearer to."""
+        limits = (one for one in (self.minimum, self.maximum) if one is not None)
+        return min(limits, key=lambda limit: abs(value - limit))
+
     @property
     def size(self) -> float:
         """What a distance is measured against: the limit itself, or the usual size of such a figure."""

@@ -192,10 +192,10 @@ Legs = tuple[_Leg, ...]
 def _cycle(design: Design, asked: Asked) -> tuple[Piece, Legs, Legs, bool]:
     """Steady motion, motion and rest of a cycle, and whether the motion is steady.
 
-    That is where the slowest pole has fallen to `STEADY` and, with all that is not linear, the rms current is
-    the same after twice as long. The rest goes on from there, and the motion begins from the rest; one too
-    short to forget that is followed with its rest until the rms current of a cycle is the same again, or for
-    as long as the motion itself was.
+    That is where the slowest pole has fallen to `STEADY` and, with all that is not linear, the rms current of
+    as long again is the same; counts of a sensor let that of single periods differ for ever. The rest goes on
+    from there, and the motion begins from the rest; one too short to forget that is followed with its rest
+    until the rms current of a cycle is the same again, or for as long as the motion itself was.
     """
     Ts, size = design.controller.period_s, asked.size_of(design)
     every = round(design.controller.period_of(design.controller.outermost) / Ts)
@@ -213,14 +213,16 @@ def _cycle(design: Design, asked: Asked) -> tuple[Piece, Legs, Legs, bool]:
     assert drive is not None
     gone, before, settling = 0, inf, settling_ticks_of(design, STEADY)
     first = wait = max(PERIODS * taken // periods, ceil(settling) if settling < inf else 0)
+    heats = list[float]()  # mean squares of the current since the last doubling
     while True:
         while gone < wait and drive.work < MOST_WORK:
             piece, gone = _went_well(drive.advance(taken)), gone + taken
-        rms = float(np.sqrt(np.mean(piece.signal("current_A") ** 2)))
+            heats.append(float(np.mean(piece.signal("current_A") ** 2)))
+        rms = sqrt(np.mean(heats)) if before < inf else sqrt(heats[-1])  # at first it settles
         steady = abs(rms - before) <= STEADY * rms
         if steady or drive.work >= MOST_WORK:
             break
-        wait, before = 2 * gone, rms
+        wait, before, heats = 2 * gone, rms, []
     if asked.share == 1.0:
         return piece, (_Leg.of(piece),), (), steady
     moving, moves = max(taken, round(asked.share * asked.cycle_s / Ts)), drive.p.copy()

@@ -135,17 +135,29 @@ class Problem:
         of the loops whose poles are known; inf where nothing bounds the figure. ``factors`` are those of the
         corners, where not those of the problem.
         """
-        population, linear = self._looked_at(gains, corners, self.factors if factors is None else factors)
-        columns = loop_columns(linear, self.design)
-        for name, load in {(r.quantity, r.load_Nm or 0.0) for r in self.requirements}:
-            if name in DRIVE_QUANTITIES:
-                columns[drive_column(name, load)] = drive_figures(population, name, load)
+        linear, columns = self._columns(gains, corners, self.factors if factors is None else factors)
         out = np.empty((len(gains) * len(corners), len(self.requirements)))
         radius = np.fmax.reduce([linear.pole_radius(loop) for loop in linear.loops], initial=1.0)
         for k, requirement in enumerate(self.requirements):
             result = judge(requirement, self.design, columns).distance / requirement.size
             out[:, k] = np.where(np.isneginf(result), -3.0 - 20.0 * (radius - 1.0), result)
         return out.reshape(len(gains), len(corners), len(self.requirements))
+
+    def found(self, gains: Floats, corner: Floats) -> list[float]:
+        """The figure behind each requirement, of one candidate at one corner."""
+        _, columns = self._columns(gains[None, :], corner[None, :], self.factors)
+        return [float(judge(one, self.design, columns).value[0]) for one in self.requirements]
+
+    def _columns(
+        self, gains: Floats, corners: Floats, factors: tuple[Factor, ...]
+    ) -> tuple[LinearFigures, dict[str, np.ndarray]]:
+        """Every candidate at every corner: its loops, and figures by column."""
+        population, linear = self._looked_at(gains, corners, factors)
+        columns = loop_columns(linear, self.design)
+        for name, load in {(r.quantity, r.load_Nm or 0.0) for r in self.requirements}:
+            if name in DRIVE_QUANTITIES:
+                columns[drive_column(name, load)] = drive_figures(population, name, load)
+        return linear, columns
 
     @cached_property
     def _timed(self) -> set[str]:

@@ -144,12 +144,14 @@ def _binding(
     enough = smallest >= RESERVE * (1.0 - _BINDS)
     if aim == "least-change":  # nothing binds a design that meets all as it came
         enough = smallest >= _BINDS or np.array_equal(gains, problem.present)
-    for requirement, away in zip(problem.requirements, distances.T, strict=True):
+    for k, (requirement, away) in enumerate(zip(problem.requirements, distances.T, strict=True)):
         worst = int(np.argmin(away))
         relative, limit = float(away[worst]), requirement.bound
         distance = relative * requirement.size if -3.0 < relative < np.inf else None
-        way = 1.0 if requirement.minimum is not None else -1.0
-        value = None if distance is None else limit + way * distance
+        value = None
+        if distance is not None:
+            value = problem.found(gains, problem.all_corners[worst])[k]
+            limit = requirement.nearer(value)
         values = problem.values_at(gains[None, :], problem.all_corners[[worst]], problem.factors)
         binds = relative <= smallest + _BINDS and not enough
         at = {factor.path: float(values[factor.path][0]) for factor in problem.factors if worst}

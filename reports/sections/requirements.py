@@ -75,9 +75,6 @@ def limit_words(of: Requirement | Odds) -> str:
 
 
 def nearer_limit(verdict: RequirementVerdict) -> tuple[float | None, str]:
-    low, high = verdict.requirement.minimum, verdict.requirement.maximum
-    if low is None:
-        return high, "<="
-    if high is None or verdict.value is None:
-        return low, ">="
-    return (low, ">=") if verdict.value - low <= high - verdict.value else (high, "<=")
+    of = verdict.requirement
+    limit = of.bound if verdict.value is None else of.nearer(verdict.value)
+    return limit, ">=" if limit == of.minimum else "<="

@@ -267,6 +267,18 @@ def test_every_corner_meets_the_requirements_in_whole_steps_and_steps_settle():
     assert any(c.limited for c in tuned.checks)
 
 
+@pytest.mark.parametrize(("least", "most", "limit"), [(10.0, 13.0, 13.0), (10.0, 400.0, 10.0)])
+def test_a_requirement_with_two_limits_is_told_by_the_nearer_one(least, most, limit):
+    """It was told by the lower one: 10.005 found of 10, where it was 12.995 of 13."""
+    band = replace(need("bandwidth", least, loop="position", unit="Hz"), maximum=most)
+    stiff = need("phase_margin", 80.0 if limit == least else 30.0, loop="position")
+    tuned = tune(load_design("ilr33-amber"), replace(QUICK, requirements=(band, stiff)))
+    (told,) = (one for one in tuned.requirements if one.id == band.id)
+    design = with_values(tuned.design, dict(told.corner)) if told.corner else tuned.design
+    found = closed_loop_bandwidth(assemble_loops(design).plain_response).minus3db_hz
+    assert (told.value, told.limit) == (pytest.approx(found, rel=1e-6), limit)
+
+
 def test_the_command_writes_a_design_that_is_what_it_says(cli, tmp_path):
     """What excludes each other, and what does not."""
     mine = tmp_path / "mine.toml"

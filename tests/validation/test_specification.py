@@ -262,6 +262,13 @@ def test_a_slow_integral_is_waited_for_or_the_duty_is_not_judged(monkeypatch: py
     assert "is not steady" in section(short)["result"]
 
 
+def test_counts_that_let_every_period_differ_leave_a_duty_judged() -> None:
+    """Of 500 counts the current of single periods differs by 1e-3 for ever; its mean does not."""
+    design = changed(AMBER, encoder={"counts_per_rev": 500, "speed": "difference"})
+    result = duty(design)
+    assert (result.steady, result.rated) == (True, Verdict.MET)
+
+
 def test_a_wait_is_counted_in_integration_steps(monkeypatch: pytest.MonkeyPatch) -> None:
     """An unstable current loop in smoothed friction takes hundreds of steps a tick, and never repeats."""
     work, advance = list[int](), Running.advance
